@@ -39,6 +39,9 @@ if TYPE_CHECKING:
     from .codegen.derivatives import Derivatives as Derivatives
     from .codegen.folder import export as export
     from .codegen.timestep import TimeStep as TimeStep
+    from .description.actuation import Actuation as Actuation
+    from .description.actuation import Magnet as Magnet
+    from .description.actuation import MagneticField as MagneticField
     from .description.contacts import Contact as Contact
     from .description.formulas import Formula as Formula
     from .description.scene import Analysis as Analysis
@@ -133,6 +136,7 @@ _PUBLIC = {
     "codegen.derivatives": "Derivatives",
     "codegen.folder": "export",
     "codegen.timestep": "TimeStep",
+    "description.actuation": "Actuation Magnet MagneticField",
     "description.contacts": "Contact",
     "description.scene": "Analysis Expect History Load Member Motion Node Scene Until",
     "description.scenefile": "dump load",

@@ -146,6 +146,9 @@ springs.NAME.force | N | | all | of a translational one
 springs.NAME.stop | N m, N | | statics | of one with a stop: what that adds; zero away from it
 motions.NAME.moment | N m | x y z | statics, motion, parameters | what makes a rotation; a number where that is one
 motions.NAME.force | N | x y z | statics, motion, parameters | what makes a displacement; a number at a driven joint
+magnets.NAME.energy | J | | statics, motion, parameters | minus the moment times the field, summed along members
+magnets.NAME.torque | N m | x y z | statics, motion, parameters | of the fields, about the places of the magnet
+magnets.NAME.force | N | x y z | statics, motion, parameters | of fields that are not uniform
 contacts.NAME.force | N | x y z | statics | on the member; of a stretch its resultant
 contacts.NAME.at | | | statics | fraction of the length, or [from, to]; null where nothing touches
 contacts.NAME.gap | m | | statics | smallest distance

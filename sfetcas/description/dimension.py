@@ -9,6 +9,7 @@ import numpy as np
 from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mathematics.quaternion import rotate
+from .actuation import Actuation, Magnet, MagneticField
 from .contacts import Contact
 from .loads import Load, Motion
 from .sections import CrossSection
@@ -33,6 +34,9 @@ def out_of_plane(
     contacts: Mapping[str, Contact],
     rotating: Triple | None,
     sections: Mapping[str, CrossSection],
+    actuations: Mapping[str, Actuation],
+    fields: Mapping[str, MagneticField],
+    magnets: Mapping[str, Magnet],
 ) -> Finding | None:
     """Place in the scene and description of the first thing that does not lie in x-y; None where all does."""
     if gravity is not None and _leaves(gravity):
@@ -49,6 +53,9 @@ def out_of_plane(
         _springs(springs),
         _cylindrical(nodes, members),
         _contacts(contacts),
+        _actuations(actuations, lines),
+        _fields(fields),
+        _magnets(magnets, lines),
     )
     return next((finding for group in findings for finding in group), None)
 
@@ -154,6 +161,39 @@ def _contacts(contacts: Mapping[str, Contact]) -> Iterator[Finding]:
             yield ("contacts", name, "axis"), "is not along z"
         if contact.type == "sphere" and contact.center is not None and contact.center[2] != 0.0:
             yield ("contacts", name, "center"), "has a z component"
+
+
+def _actuations(actuations: Mapping[str, Actuation], lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
+    for name, actuation in actuations.items():
+        # Along a plane line the sections turn about z: what bends out of x-y at the start does so everywhere.
+        start = lines[actuation.member].quaternions(np.zeros(1))
+        turned = rotate(start, np.asarray(actuation.vector))[0]
+        if _turns_out(tuple(turned.tolist())):
+            yield ("actuations", name, "value"), "bends or twists out of x-y"
+
+
+def _fields(fields: Mapping[str, MagneticField]) -> Iterator[Finding]:
+    for name, field in fields.items():
+        for key in ("value", "moment", "position"):
+            vector = getattr(field, key)
+            if vector is not None and _leaves(vector):
+                yield ("fields", name, key), "has a z component"
+        if field.gradient is None:
+            continue
+        slopes = np.abs(field.gradient)[:2]
+        if slopes[:, 2].max() > tolerances.DECIMAL * slopes.max():
+            yield ("fields", name, "gradient"), "changes the field along z or towards z"
+
+
+def _magnets(magnets: Mapping[str, Magnet], lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
+    for name, magnet in magnets.items():
+        if magnet.member is None:
+            if _leaves(magnet.vector):
+                yield ("magnets", name, "moment"), "has a z component"
+            continue
+        start = lines[magnet.member].quaternions(np.zeros(1))
+        if _leaves(rotate(start, np.asarray(magnet.vector))[0]):
+            yield ("magnets", name, "moment_density"), "leaves x-y"
 
 
 def _leaves(vector: Triple | Array) -> bool:

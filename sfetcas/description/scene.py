@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Literal
@@ -15,6 +15,7 @@ from pydantic import ConfigDict, Field, model_validator
 from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.quaternion import matrix
+from .actuation import Actuation, Magnet, MagneticField
 from .answers import answer_name, check_answer
 from .changes import FACTOR, Branch, branch_of, carry_ends, with_entries
 from .contacts import Contact
@@ -34,11 +35,14 @@ from .supports import check_driven_joint, check_floating, check_motion, check_mo
 from .task import Analysis, Expect, Until
 
 __all__ = [
+    "Actuation",
     "Analysis",
     "Contact",
     "Expect",
     "History",
     "Load",
+    "Magnet",
+    "MagneticField",
     "Member",
     "Motion",
     "Node",
@@ -84,6 +88,12 @@ class Scene(Record):
         ``[motions.NAME]``, or ``[prescribed.NAME]``: prescribed displacements and rotations.
     histories : table by name
         ``[histories.NAME]``: factors of loads and motions, over the load factor or the time.
+    actuations : table by name
+        ``[actuations.NAME]``: natural curvature and twist of members.
+    fields : table by name
+        ``[fields.NAME]``: magnetic fields.
+    magnets : table by name
+        ``[magnets.NAME]``: magnetised members and magnetic dipoles.
     contacts : table by name
         ``[contacts.NAME]``: frictionless obstacles.
     analysis : table
@@ -121,6 +131,9 @@ class Scene(Record):
     loads: Named[Load] = Field(default_factory=dict)
     motions: Named[Motion] = Field(default_factory=dict)
     histories: Named[History] = Field(default_factory=dict)
+    actuations: Named[Actuation] = Field(default_factory=dict)
+    fields: Named[MagneticField] = Field(default_factory=dict)
+    magnets: Named[Magnet] = Field(default_factory=dict)
     contacts: Named[Contact] = Field(default_factory=dict)
     analysis: Analysis = Analysis()
     expect: tuple[Expect, ...] = ()
@@ -271,8 +284,26 @@ class Scene(Record):
             self.contacts,
             self.rotating,
             self.sections,
+            self.actuations,
+            self.fields,
+            self.magnets,
         )
 
+    @property
+    def driven(self) -> Iterator[tuple[str, str, Any]]:
+        """Table, name and record of all that grows with the load factor or has a history; gravity grows too."""
+        for table in DRIVEN:
+            for name, record in getattr(self, table).items():
+                yield table, name, record
+
+    @property
+    def histories_used(self) -> set[str]:
+        """Names of the histories that something has."""
+        return {record.history for _, _, record in self.driven if record.history is not None}
+
+
+DRIVEN = ("loads", "motions", "actuations", "fields")
+"""Tables of what grows with the load factor, or with a history."""
 
 _TABLES = {
     "sections": ("section",),
@@ -282,6 +313,9 @@ _TABLES = {
     "loads": ("load",),
     "motions": ("prescribed motion",),
     "histories": ("history", "histories"),
+    "actuations": ("actuation",),
+    "fields": ("magnetic field",),
+    "magnets": ("magnet",),
     "contacts": ("contact",),
 }
 """Tables of a scene in their order, with what one of their entries is."""
@@ -340,7 +374,7 @@ def check_loaded(scene: Scene) -> None:
         return
     pressed = any(spring.rest or spring.length is not None for spring in scene.springs.values())
     everywhere = scene.gravity is not None or scene.rotating is not None
-    if not scene.loads and not scene.motions and not everywhere and not pressed:
+    if not any(scene.driven) and not everywhere and not pressed:
         raise SceneError("scene without load: statics needs at least one load, one motion, gravity or turning axes")
 
 
@@ -352,6 +386,14 @@ def _check_driven(scene: Scene) -> None:
     for name, motion in scene.motions.items():
         _known(motion.node, scene.nodes, "nodes", "motions", name, "node")
         _known(motion.history, scene.histories, "histories", "motions", name, "history")
+    for name, actuation in scene.actuations.items():
+        _known(actuation.member, scene.members, "members", "actuations", name, "member")
+        _known(actuation.history, scene.histories, "histories", "actuations", name, "history")
+    for name, field in scene.fields.items():
+        _known(field.history, scene.histories, "histories", "fields", name, "history")
+    for name, magnet in scene.magnets.items():
+        _known(magnet.member, scene.members, "members", "magnets", name, "member")
+        _known(magnet.node, scene.nodes, "nodes", "magnets", name, "node")
 
 
 def _known(word: str | None, table: Iterable[str], kind: str, *where: str) -> None:
@@ -495,6 +537,29 @@ def _check_loads(scene: Scene) -> None:
         if joint != "rigid" and load.frame == "follower":
             message = f"node {load.node!r} has no rotation of its own to follow, as its joint is a {joint}"
             raise SceneError(message, ("loads", name, "node"))
+
+
+def _check_actuated(scene: Scene) -> None:
+    for name, actuation in scene.actuations.items():
+        kind = scene.members[actuation.member].type
+        if kind != "flexible":
+            message = f"found the {kind} member {actuation.member!r}, accepted: a flexible one, which bends"
+            raise SceneError(message, ("actuations", name, "member"))
+    if scene.magnets and not scene.fields:
+        raise SceneError("found magnets without a field, accepted: with [fields.NAME]", ("magnets",))
+    if scene.fields and not scene.magnets:
+        raise SceneError("found a field without magnets on which it acts, accepted: with [magnets.NAME]", ("fields",))
+    for name, magnet in scene.magnets.items():
+        if magnet.member is not None and scene.members[magnet.member].type == "small":
+            accepted = "a flexible or rigid one, or dipoles at its nodes"
+            found = f"found the small member {magnet.member!r}"
+            raise SceneError(f"{found}, accepted: {accepted}", ("magnets", name, "member"))
+        if magnet.node is not None and scene.nodes[magnet.node].joint != "rigid":
+            joint = scene.nodes[magnet.node].joint
+            message = (
+                f"node {magnet.node!r} has no rotation of its own that a dipole turns with, as its joint is a {joint}"
+            )
+            raise SceneError(message, ("magnets", name, "node"))
 
 
 def _check_springs(scene: Scene) -> None:
@@ -688,6 +753,7 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_releases,
     _check_bodies,
     _check_loads,
+    _check_actuated,
     _check_springs,
     _check_motions,
     _check_supports,

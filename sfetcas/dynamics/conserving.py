@@ -249,7 +249,7 @@ def _element(element: Element) -> ca.Function:
     The derivative is that of elastic moments at the mean state, which differs from the exact one by the square of what
     nodes turn in a step; that of all else is exact.
     """
-    n, axes, turns = element.order + 1, element.axes, element.turns
+    n, axes = element.order + 1, element.axes
     _, _, _, data_size, load_size = element.sizes
     q0, q1 = ca.SX.sym("q0", element.components, n), ca.SX.sym("q1", element.components, n)
     u0, u1 = ca.SX.sym("u0", axes, element.sizes[1]), ca.SX.sym("u1", axes, element.sizes[1])
@@ -257,15 +257,9 @@ def _element(element: Element) -> ca.Function:
     stiffness, tangent, compliance = element.split(data)
     pull = ca.reshape(load, axes, n) + ca.repmat(lam, 1, n)
     slopes = differentiation(element.nodes)
-    moments = [ca.SX.zeros(turns) for _ in range(n)]
-    for k in range(n):
-        effort = _effort(element, 0.5 * (_strain(slopes[k], k, q0) + _strain(slopes[k], k, q1)), stiffness[:, k])
-        for j in range(n):
-            if j != k:
-                gain = _relative(q0[:, k], q1[:, k], q0[:, j], q1[:, j])
-                share = slopes[k, j] * (ca.mtimes(gain[1:, :].T, effort) if element.space else gain * effort)
-                moments[j] += share
-                moments[k] -= share
+    means = [0.5 * (_strain(slopes[k], k, q0) + _strain(slopes[k], k, q1)) for k in range(n)]
+    efforts = [_effort(element, mean, stiffness[:, k]) for k, mean in enumerate(means)]
+    moments = _moments(element, q0, q1, efforts)
     before, after = _vectors(element, q0, u0, data), _vectors(element, q1, u1, data)
     mean = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
     work = ca.vertcat(*[_crossed(mean[k], pull[:, k]) for k in range(n)])
@@ -274,11 +268,11 @@ def _element(element: Element) -> ca.Function:
         for k in range(element.sizes[1])
     ]
     end, basis = ca.vertcat(ca.vec(q1), ca.vec(u1)), ca.diagcat(_basis(q1), ca.SX.eye(u1.numel()))
-    near = ca.mtimes(ca.jacobian(ca.vertcat(_at_mean(element, q0, q1, stiffness) + work, *strains), end), basis)
+    near = ca.mtimes(ca.jacobian(ca.vertcat(_at_mean(element, q0, q1, efforts) + work, *strains), end), basis)
     mean_rotation_jacobian = ca.jacobian(ca.vertcat(work, *strains), lam).T
     gained = ca.sum2(ca.horzcat(*after) - tangent)
     rotation_jacobian = ca.mtimes(ca.jacobian(gained, end), basis)
-    gradient = ca.vertcat(ca.vertcat(*moments) + work, *strains)
+    gradient = ca.vertcat(moments + work, *strains)
     results = [ca.densify(part) for part in (gradient, near, gained, mean_rotation_jacobian, rotation_jacobian)]
     end = ca.SX.sym("load_end", load_size)
     return ca.Function(f"between_{name_of(element)}", [q0, u0, q1, u1, data, load, end, lam], results)
@@ -301,18 +295,39 @@ def _effort(element: Element, strain: ca.SX, stiffness: ca.SX) -> ca.SX:
     return 4.0 * ca.mtimes(full, strain)
 
 
-def _at_mean(element: Element, q0: ca.SX, q1: ca.SX, stiffness: ca.SX) -> ca.SX:
+def _moments(element: Element, q0: ca.SX, q1: ca.SX, efforts: list[ca.SX]) -> ca.SX:
+    """Moments on the nodes by the derivatives of an energy by the strains, exact between two states."""
+    n, slopes = element.order + 1, differentiation(element.nodes)
+    moments = [ca.SX.zeros(element.turns) for _ in range(n)]
+    for k, effort in enumerate(efforts):
+        for j in range(n):
+            if j != k:
+                gain = _relative(q0[:, k], q1[:, k], q0[:, j], q1[:, j])
+                share = slopes[k, j] * (ca.mtimes(gain[1:, :].T, effort) if element.space else gain * effort)
+                moments[j] += share
+                moments[k] -= share
+    return ca.vertcat(*moments)
+
+
+def _at_mean(element: Element, q0: ca.SX, q1: ca.SX, values: list[ca.SX]) -> ca.SX:
     """Elastic moments by the derivatives of strains at the mean quaternions."""
     n, slopes = element.order + 1, differentiation(element.nodes)
     q, work = ca.SX.sym("q", element.components, n), ca.SX(0)
     efforts = [ca.SX.sym(f"effort_{k}", element.turns) for k in range(n)]
     for k, effort in enumerate(efforts):
         work += ca.dot(effort, _strain(slopes[k], k, q))
-    means = [0.5 * (_strain(slopes[k], k, q0) + _strain(slopes[k], k, q1)) for k in range(n)]
-    values = [_effort(element, mean, stiffness[:, k]) for k, mean in enumerate(means)]
     middle = 0.5 * (q0 + q1)
     (gradient,) = ca.substitute([ca.vec(ca.gradient(work, q))], [q, *efforts], [middle, *values])
     return ca.mtimes(_basis(middle).T, gradient)
+
+
+def _of_strains(kind: Term, q0: ca.SX, q1: ca.SX, data: ca.SX, load: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Moments of an energy that is linear in the strains of an element, and their derivative, nearly."""
+    element, efforts = kind.efforts(data, load)
+    # Strains here are half the curvature in space.
+    columns = [(2.0 if element.space else 1.0) * effort for effort in ca.horzsplit(efforts)]
+    near = ca.jacobian(_at_mean(element, q0, q1, columns), ca.vec(q1))
+    return _moments(element, q0, q1, columns), ca.mtimes(near, _basis(q1))
 
 
 def _sides(q: ca.SX, u: ca.SX) -> tuple[list[Side], list[Side]]:
@@ -357,6 +372,11 @@ def _between(kind: Term) -> ca.Function:
         gradient, rotation_jacobian = ca.substitute(results, [q, u], [at, moved])
         return gradient, rotation_jacobian
 
+    arguments = [q0, u0, q1, u1, data, load, load_end, lam]
+    if kind.discrete == "strains":
+        width = kind.turns * turns
+        results = [*_of_strains(kind, q0, q1, data, load), ca.SX(0, 1), ca.SX(0, width), ca.SX(0, width)]
+        return ca.Function(f"between_{name_of(kind)}", arguments, [ca.densify(part) for part in results])
     middle = 0.5 * (q0 + q1), 0.5 * (u0 + u1)
     if kind.space and turns:
         middle = ca.horzcat(*[side / ca.norm_2(side) for side in ca.horzsplit(middle[0])]), middle[1]
@@ -376,5 +396,4 @@ def _between(kind: Term) -> ca.Function:
     changed = ca.mtimes(ca.jacobian(gradient, end), of_end)
     results = [ca.densify(part) for part in (gradient, changed, values(q1, u1, load_end)[1], mean_rotation_jacobian)]
     rotation_jacobian = ca.densify(ca.mtimes(ca.jacobian(values(q1, u1, load_end)[1], end), of_end))
-    arguments = [q0, u0, q1, u1, data, load, load_end, lam]
     return ca.Function(f"between_{name_of(kind)}", arguments, [*results, rotation_jacobian])

@@ -200,6 +200,10 @@ class Configuration:
         """What enforces a prescribed motion: ``moment`` (N m) or ``force`` (N), see :meth:`.Fields.drive`."""
         return self.fields.drive(self._known(name, tuple(self.model.scene.motions), "motion"))
 
+    def magnet(self, name: str) -> dict[str, Any]:
+        """What the fields do to a magnet: ``energy`` (N m), ``torque`` (3,) N m and ``force`` (3,) N, fixed axes."""
+        return self.fields.magnet(self._known(name, tuple(self.model.scene.magnets), "magnet"))
+
     def along(self, member: str, at: Any) -> dict[str, Array]:
         """Fields of a member at fractions of its length, from 0 at its first node to 1.
 
@@ -261,7 +265,8 @@ class Configuration:
         Parameters
         ----------
         kind : str
-            A table of the answer: ``nodes``, ``reactions``, ``members``, ``springs``, ``motions`` or ``contacts``;
+            A table of the answer: ``nodes``, ``reactions``, ``members``, ``springs``, ``motions``, ``magnets`` or
+            ``contacts``;
             empty for the quantities of the whole state.
         name : str
             Name of the record.  Of a member only integral and largest values; :meth:`along` has its fields.
@@ -278,6 +283,7 @@ class Configuration:
             "members": lambda: self._member(name),
             "springs": lambda: dict(self.spring(name).to_dict()),
             "motions": lambda: self.motion(name),
+            "magnets": lambda: self.magnet(name),
             "contacts": lambda: self.contacts.get(name, {}),
         }
         return tables[kind]() if kind in tables else {}
@@ -377,7 +383,7 @@ class Equilibrium(Configuration):
 
     def to_dict(self) -> dict[str, Any]:
         """The equilibrium as an entry of ``steps`` in the JSON answer."""
-        tables = self.tables("nodes", "reactions", "members", "springs", "motions", "contacts")
+        tables = self.tables("nodes", "reactions", "members", "springs", "motions", "magnets", "contacts")
         for name, found in tables["members"].items():
             places = self.places(name)
             tables["members"][name] = {"s": places, **self.along(name, places), **found}

@@ -16,6 +16,7 @@ from ..mathematics.keeping import kept
 from .batches import GroupBatch
 from .connections import connections_of
 from .equations import Equations, State
+from .load_terms import elements_of
 from .loading import Loading
 from .terms import answers_of
 
@@ -110,7 +111,13 @@ class Balance:
 
     def starting_moments(self, elements: slice) -> Array:
         """Moments (n, 3) that the surroundings exert on the first nodes of elements."""
-        return self._three(self._shares[0][elements, : self._turns])
+        found = self._shares[0][elements, : self._turns].copy()
+        for group, share in zip(self.model.terms, self._shares, strict=True):
+            if group.kind.along_element:
+                number = elements_of(group) - elements.start
+                inside = (number >= 0) & (number < len(found))
+                np.add.at(found, number[inside], share[inside, : self._turns])
+        return self._three(found)
 
     def start_moment(self, member: str) -> Array:
         """Moment (3,) that the surroundings exert on the first end of a flexible or rigid member."""

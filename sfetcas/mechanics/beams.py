@@ -92,6 +92,11 @@ def load_size(scene: Scene, length: float) -> float:
         [math.hypot(*load.vector) for load in scene.loads.values() if load.type == kind]
         for kind in ("force", "moment", "distributed")
     )
+    strength = sum(field.size for field in scene.fields.values())
+    moments += [
+        strength * math.hypot(*magnet.vector) * (1.0 if magnet.member is None else length)
+        for magnet in scene.magnets.values()
+    ]
     masses = [node.mass for node in scene.nodes.values()]
     for name, member in scene.members.items():
         if member.section is not None:

@@ -13,6 +13,7 @@ Magnitudes are added up whatever the directions, as loads may turn.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,7 @@ from ..description.scene import Scene
 from ..mathematics.arrays import Array, Index
 from ..mathematics.linear import SparseSolver
 
-__all__ = ["Carried", "carried"]
+__all__ = ["Carried", "carried", "magnetic", "natural_turning"]
 
 ALLOWANCE = 4.0
 """A member of loops is taken to carry so many times the largest share of them, though no more than all loads."""
@@ -67,7 +68,7 @@ class _Acting:
 
     def __init__(self, scene: Scene, number: dict[str, int]) -> None:
         self._scene, self._number = scene, number
-        self._largest = max(abs(factor) for factor in scene.analysis.steps)
+        self._largest = _largest(scene, None)
         self.along: dict[str, Array] = {}
         self.at_nodes = np.zeros((len(number) + 1, 2))
         self._ending: dict[str, list[str]] = {name: [] for name in scene.nodes}
@@ -76,6 +77,10 @@ class _Acting:
                 self._ending[node].append(name)
         for load in scene.loads.values():
             self._take(load)
+        strength = _strength(scene)
+        for magnet in scene.magnets.values():
+            if magnet.node is not None:
+                self.at_nodes[self._number[magnet.node], 1] += math.hypot(*magnet.vector) * strength(magnet.node)
         if scene.gravity is not None:
             self._weigh(float(np.linalg.norm(scene.gravity)) * self._largest)
 
@@ -102,10 +107,7 @@ class _Acting:
             self.at_nodes[self._number[load.node]] += size
 
     def _share(self, load: Load) -> float:
-        if load.history is None:
-            return self._largest
-        history = self._scene.histories[load.history]
-        return max(abs(history.factor(factor)) for factor in self._scene.analysis.steps)
+        return _largest(self._scene, load.history)
 
     def _weigh(self, pull: float) -> None:
         scene, x = self._scene, np.linspace(0.0, 1.0, 5)
@@ -115,6 +117,49 @@ class _Acting:
                 self._add(name, np.array([pull * mass, 0.0]))
         for name, node in scene.nodes.items():
             self.at_nodes[self._number[name], 0] += pull * node.mass
+
+
+def _largest(scene: Scene, history: str | None) -> float:
+    """Largest factor in the steps of the analysis of what has a history, or grows with the load factor."""
+    steps = scene.analysis.steps
+    return max(abs(factor if history is None else scene.histories[history].factor(factor)) for factor in steps)
+
+
+def _strength(scene: Scene) -> Callable[[str], float]:
+    """The magnetic field, T, at factor 1, added up in magnitude, at a node in the undeformed scene."""
+
+    def at(node: str) -> float:
+        fields = scene.fields.values()
+        return float(sum(np.linalg.norm(field.of(scene.nodes[node].position)) for field in fields))
+
+    return at
+
+
+def magnetic(scene: Scene, member: str) -> float:
+    """Magnitude, N, of the force at an end that would bend a magnetised member as the fields do: moment per length
+    times the field.
+    """
+    x, found = np.linspace(0.0, 1.0, 9), 0.0
+    for magnet in scene.magnets.values():
+        if magnet.member == member:
+            places = scene.center_lines[member].positions(x)
+            strength = sum(
+                _largest(scene, field.history) * np.linalg.norm(field.of(places), axis=1).max()
+                for field in scene.fields.values()
+            )
+            found += float(np.linalg.norm(magnet.along(x), axis=1).max() * strength)
+    return found
+
+
+def natural_turning(scene: Scene, member: str) -> float:
+    """Angle, rad, by which actuations at factor 1 bend and twist a free member, at most."""
+    found = 0.0
+    for actuation in scene.actuations.values():
+        if actuation.member == member:
+            low, high = actuation.span
+            most = np.linalg.norm(actuation.along(np.linspace(low, high, 9)), axis=1).max()
+            found += float(most) * (high - low) * scene.center_lines[member].length
+    return found
 
 
 def _holds(scene: Scene, name: str) -> bool:

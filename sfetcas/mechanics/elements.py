@@ -173,6 +173,16 @@ class Element(Term):
         k = 2.0 * ca.vertcat(*product([q[0], -q[1], -q[2], -q[3]], ca.vertsplit(slope))[1:])
         return k / ca.dot(here, here) if self.gauss else k
 
+    def changes(self, q: list[Side]) -> list[ca.SX]:
+        """Change of the curvature times length (turns,) at each point, about the fixed axes; in the plane about z."""
+        here, slope = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
+        points = range(self.order + 1)
+        return [self._curvature(here[:, k], slope[:, k]) if self.space else slope[:, k] for k in points]
+
+    def section(self, stiffness: ca.SX) -> ca.SX:
+        """Stiffness of one point as a matrix (turns, turns)."""
+        return self._section(stiffness) if self.space else stiffness
+
     def _section(self, stiffness: ca.SX) -> ca.SX:
         """Stiffness of one point in space as a matrix."""
         c = ca.vertsplit(stiffness)

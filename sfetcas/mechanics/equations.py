@@ -316,6 +316,8 @@ class Equations:
         scale = self._gathered_sizes([part[3] for part in found], results.pull) + self.noise
         if loading.further.any():
             residual -= self._of_moments(loading.further)
+        if loading.torque.any():
+            residual -= self._of_torque(loading.torque)
         lam = state.lam[: len(positions.rows)]
         if self.displacement_unknowns:
             displacement = slice(rotation_unknowns, self.unknowns)
@@ -341,6 +343,13 @@ class Equations:
         found = np.bincount(unknown[used], weights=given[used], minlength=self.total)
         return found.astype(float, copy=False)
 
+    def _of_torque(self, torque: Array) -> Array:
+        """Couples along elements, which integrate at their nodes, on the unknowns."""
+        moments = np.zeros((len(self.model.rotations.kind), 3))
+        width = torque.shape[2]
+        np.add.at(moments[:, 3 - width :], self.model.rotations.turns.ravel(), torque.reshape(-1, width))
+        return self._of_moments(moments)
+
     def _gathered_sizes(self, gradients: list[Array], pull: Array) -> Array:
         """What a node adds up: moments of its terms, and within elements the forces times the length they act on."""
         sizes = np.abs(np.concatenate([part.ravel() for part in gradients]))
@@ -356,7 +365,8 @@ class Equations:
         places = self.retained_places(state, rate)
         for group, load in zip(self._terms[1:], rate.loads, strict=True):
             # What loads do is linear in them.
-            found = group(state, places, load, np.zeros(0))[3] if group.kind.is_load else np.zeros(group.sides.shape)
+            linear = group.kind.proportional
+            found = group(state, places, load, np.zeros(0))[3] if linear else np.zeros(group.sides.shape)
             parts.append(found.copy())
         slope = self._gathered(parts)
         slope[self.rotation_unknowns : self.unknowns] -= positions.Y.T @ rate.force.ravel()
@@ -371,11 +381,15 @@ class Equations:
     def shares(self, state: State, loading: Loading) -> list[Array]:
         """Generalised forces that the terms take from their surroundings at a state, dimensionless.
 
-        For each group (n, width): moments on the rotations, then forces on the places; zero for loads.
+        For each group (n, width): moments on the rotations, then forces on the places; zero for loads.  Elements take
+        the couples along them, too.
         """
-        found = self._evaluated(state, self.acting(state, loading)).groups
+        acting = self.acting(state, loading)
+        found = self._evaluated(state, acting).groups
         pairs = zip(found, self.model.terms, strict=True)
-        return [np.zeros_like(part[3]) if group.kind.is_load else part[3].copy() for part, group in pairs]
+        shares = [np.zeros_like(part[3]) if group.kind.is_load else part[3].copy() for part, group in pairs]
+        shares[0] -= acting.torque.reshape(shares[0].shape)
+        return shares
 
     @functools.cached_property
     def reactions(self) -> Reactions:
@@ -412,7 +426,7 @@ class Equations:
 
     def effective(self, state: State, loading: Loading) -> Loading:
         """The loading with follower loads evaluated at the state, as dead loads."""
-        return present(self.model, state.q, loading)
+        return present(self.model, state.q, self.retained_places(state, loading), loading)
 
     def acting(self, state: State, loading: Loading) -> Loading:
         """The effective loading, in rotating axes with the centrifugal forces."""

@@ -20,11 +20,13 @@ from .balance import Balance, SpringState
 from .balance import three as _three
 from .batches import GroupBatch
 from .equations import Equations, State, scaled_strains, turned_points, turned_tangents
+from .load_terms import elements_of
 from .loading import Loading
+from .magnetism import magnet_terms
 from .mesh import Touch
 from .singles import fibre_strain
 from .stations import Stations
-from .terms import energies_of
+from .terms import answers_of, energies_of
 
 __all__ = ["Fields", "rotations_along", "strained_like", "transferred"]
 
@@ -161,20 +163,39 @@ class Fields:
             stiffness = section.stiffness(x)
             with np.errstate(invalid="ignore"):
                 strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
-        result["curvature"] = line.curvatures(x) + strain
+        result["curvature"] = line.curvatures(x) + self.natural(member, x) + strain
         if record.stretches(model.scene.sections):
-            compliance = model.scene.sections[str(record.section)].compliance(x)
-            result["strain"] = compliance * np.einsum("nij,ni->nj", frames, result["force"])
+            result["strain"] = section.compliance(x) * np.einsum("nij,ni->nj", frames, result["force"])
         return result
+
+    def natural(self, member: str, x: Array) -> Array:
+        """Natural twist and curvature (n, 3), 1/m, section axes, that actuations add at fractions x (n,) of a member's
+        length.
+        """
+        model, part = self.model, self.model.elements_of(member)
+        found = np.zeros((part.stop - part.start, len(model.element.points), 3))
+        for group, load in zip(model.connections, self._loading.loads, strict=True):
+            if group.kind.table == "actuations":
+                number = elements_of(group) - part.start
+                own = (number >= 0) & (number < len(found))
+                values = load[own].reshape(-1, found.shape[1], model.element.turns)
+                found[number[own], :, 3 - model.element.turns :] = values
+        if not found.any():
+            return np.zeros((len(x), 3))
+        at = self._stations(member, x)
+        values = np.einsum("np,npa->na", at.at_points, found[at.elements]) / model.scales.length
+        return quaternion.rotate(quaternion.conjugate(model.scene.center_lines[member].quaternions(x)), values)
 
     def bending(self, member: str, x: Array, curvature: Array) -> tuple[Array, Array]:
         """Largest fibre strain and stress (Pa) by bending, (n,) each, of a member whose section has a shape.
 
+        The curvature that is natural strains no fibre.
         ``curvature`` (n, 3) 1/m at fractions x (n,) of the length, as of :meth:`along`.
         """
         scene = self.model.scene
         section = scene.sections[str(scene.members[member].section)]
-        change, fibres = curvature - scene.center_lines[member].curvatures(x), section.fibres(x)
+        change = curvature - scene.center_lines[member].curvatures(x) - self.natural(member, x)
+        fibres = section.fibres(x)
         strain = fibre_strain(section.shape != "rectangle")(change.T, fibres[:, 1:].T).full().ravel()
         return strain, fibres[:, 0] * strain
 
@@ -198,10 +219,26 @@ class Fields:
     @functools.cached_property
     def _strain_energies(self) -> Array:
         """Of all elements."""
-        elements = self.model.terms[0]
-        return GroupBatch(self.model, elements, energies_of(elements.kind))(self.q, self._nodal, self.state.unwrapped)[
-            1
-        ].ravel()
+        elements, found = self.model.terms[0], np.zeros(len(self.model.beams.weight))
+        for number, group in enumerate(self.model.terms):
+            if group is not elements and group.kind.table != "actuations":
+                continue
+            load = self._loading.loads[number - 1] if number else None
+            batch = GroupBatch(self.model, group, energies_of(group.kind))
+            energies = batch(self.q, self._nodal, self.state.unwrapped, load)[1].ravel()
+            found[elements_of(group) if number else slice(None)] += energies
+        return found
+
+    def magnet(self, name: str) -> dict[str, Any]:
+        """What the fields do to a magnet: ``energy`` (N m), ``torque`` (3,) N m and ``force`` (3,) N."""
+        model, total = self.model, np.zeros(7)
+        loads = self._loading.before or self._loading.loads
+        for number, own in magnet_terms(model.connections, name):
+            group = model.connections[number]
+            batch = GroupBatch(model, group, answers_of(group.kind))
+            total += batch(self.q, self._nodal, self.state.unwrapped, loads[number])[0][own].sum(axis=0)
+        energy, torque = float(total[0]) * model.scales.moment, total[1:4] * model.scales.moment
+        return {"energy": energy, "torque": torque, "force": total[4:] * model.scales.force}
 
     def _along(self, member: str, x: Array, *, pressed: bool = True) -> dict[str, Array]:
         """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted."""
@@ -212,7 +249,7 @@ class Fields:
         position, moments = self.positions(member, x), self._element_moments(member)
         force = _three(np.einsum("nk,nka->na", at.spread, spread[e]) - pull[e, 0])
         # m' = -r' x n; the pull at the points is minus the force there.
-        moment = _summed(at, moments, _cross(self.turned[part], pull))
+        moment = _summed(at, moments, self._gained(part, pull))
         rotation = rotations_along(model, self.state.q, member, x)
         for touch in model.mesh.touches if pressed else ():
             if touch.member == member and touch.to is not None:
@@ -400,7 +437,7 @@ class Fields:
         stiffness = scene.sections[str(scene.members[touch.member].section)].stiffness(x)
         column = 1 if line.bending_axis == 2 else 2
         sign = np.rint(quaternion.matrix(line.quaternions(x))[:, 2, column])
-        bent = self._curvature(touch) - sign * line.curvatures(x)[:, column]
+        bent = self._curvature(touch) - sign * (line.curvatures(x) + self.natural(touch.member, x))[:, column]
         axes = np.broadcast_to([0.0, 0.0, 1.0], (len(x), 3))
         return np.asarray(stiffness[:, column] * bent / self.model.scales.moment), axes
 
@@ -419,6 +456,7 @@ class Fields:
         spin = 2.0 * quaternion.multiply(quaternion.conjugate(rotation), slope)[:, 1:]
         line, record = model.scene.center_lines[touch.member], model.scene.members[touch.member]
         strain = np.einsum("nij,ni->nj", quaternion.matrix(line.quaternions(middle)), spin)
+        strain -= self.natural(touch.member, middle)
         stiffness = model.scene.sections[str(record.section)].stiffness_matrix(middle)
         frames = self._frames(touch.member, middle, rotation)
         moments = np.einsum("nij,njk,nk->ni", frames, stiffness, strain) / model.scales.moment
@@ -534,6 +572,12 @@ class Fields:
         beyond = np.einsum("j,eja->ea", element.to_points[:, 0], spread) / element.weights[0]
         return -self._pull[part][:, 0] - beyond + spread.sum(axis=1)
 
+    def _gained(self, part: slice, pull: Array) -> Array:
+        """What the moment gains at the points of elements (elements, points, 3): by forces, less couples along them."""
+        torque, gained = self._loading.torque[part], _cross(self.turned[part], pull)
+        gained[..., 3 - torque.shape[2] :] -= torque
+        return gained
+
     @kept(MEMBERS)
     def _element_starts(self, member: str) -> Array:
         """Displacement at the start of each element of a member (and its end)."""
@@ -548,7 +592,7 @@ class Fields:
         """Moment at the start of each element of a member (and its end)."""
         model = self.model
         part = model.elements_of(member)
-        gains = _cross(self.turned[part], self._pull[part]).sum(axis=1)
+        gains = self._gained(part, self._pull[part]).sum(axis=1)
         chain = model.rotations.turns[part]
         # A couple at a cut is a jump of the moment.
         if model.scene.members[member].type == "rigid":

@@ -10,6 +10,7 @@ Source: Barraco and Munteanu, Part 1, section 4 (virtual work).
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, final
@@ -21,14 +22,14 @@ from ..description.loads import Load
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers, scattered, values_of
+from ..mathematics.kernels import Batch
 from .elements import Element
 from .joints import Turning
 from .mesh import Mesh
 from .parts import Parts
 from .rotations import STIFF, RotationFreedom, Rotations, end_joints
 from .segments import Segments
-from .singles import turned_vector
-from .terms import GROUND, Discrete, Group, One, Side, Term
+from .terms import GROUND, Discrete, Group, One, Side, Term, densities_of
 
 __all__ = [
     "AxisMoment",
@@ -118,6 +119,12 @@ class FollowingSpread(Term):
             by_strain = ca.jacobian(tangents[k], ca.vertcat(*u[1 + k]))
             straining += [-f for f in ca.vertsplit(ca.mtimes(by_strain.T, carried[k]))]
         return [*moments, *[-f for f in ca.vertsplit(total)], *straining]
+
+    def densities(
+        self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX
+    ) -> tuple[list[ca.SX], list[ca.SX]] | None:
+        """The rotated forces, and no couples."""
+        return self._now(q, u, data, load)[1], [ca.SX.zeros(self.turns * len(q))]
 
     def work(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """Minus the rotated forces times the displacements of the nodes."""
@@ -347,29 +354,37 @@ def carried(forces: Array, segments: Segments, element: Element) -> tuple[Array,
 # -- what they are at a state -----------------------------------------------------------------------
 
 
-def present(model: Any, q: Array, loading: Any) -> Any:
-    """The :class:`~sfetcas.mechanics.loading.Loading` with follower loads as dead loads at rotations (rotations,
-    components).
+def present(model: Any, q: Array, places: Array, loading: Any) -> Any:
+    """The :class:`~sfetcas.mechanics.loading.Loading` with loads that turn as dead loads at a state.
 
-    It serves to evaluate answers: the rotated followers are added to the dead loads, and the follower terms are zero.
+    Rotations are (rotations, components), displacements (places, axes).  It serves to evaluate answers: what turns is
+    added to the dead loads, and its terms have no loads.
     """
-    if not loading.follows:
+    if not (loading.follows or loading.of(_has_densities)):
         return loading
     found = {
         name: getattr(loading, name).copy()
-        for name in ("force", "own", "spread", "moment", "further", "couple", "jump")
+        for name in ("force", "own", "spread", "moment", "further", "couple", "jump", "torque")
     }
     along, loads = np.zeros_like(loading.spread), list(loading.loads)
     for i, (group, load) in enumerate(zip(model.connections, loading.loads, strict=True)):
+        if _has_densities(group.kind):
+            batch = _densities(group.kind, len(load))
+            for k, values in enumerate((q[group.turns], places[group.places], group.data, load)):
+                batch.set(k, values)
+            forces, couples = batch()
+            number = elements_of(group)
+            np.add.at(along, number, forces.reshape(len(number), *along.shape[1:]))
+            np.add.at(found["torque"], number, couples.reshape(len(number), *loading.torque.shape[1:]))
+            loads[i] = np.zeros_like(load)
+            continue
         if not group.kind.follows:
             continue
         loads[i] = np.zeros_like(load)
         on_places = group.places.shape[1]
         width = model.element.axes if on_places else 3
         turned = quaternion.turned_by(q[group.turns], load.reshape(len(load), -1, width))
-        if group.kind.along_element:
-            along[elements_of(group)] = turned
-        elif on_places:
+        if on_places:
             for part in ("force", "own"):
                 np.add.at(found[part], group.places[:, 0], turned[:, 0])
         else:
@@ -379,7 +394,19 @@ def present(model: Any, q: Array, loading: Any) -> Any:
     pull, carried_to = carried(along, model.segments, model.element)
     found["spread"] += along
     found["force"] += carried_to
-    return replace(loading, **found, pull=loading.pull + pull, loads=tuple(loads))
+    before = loading.before or loading.loads
+    return replace(loading, **found, pull=loading.pull + pull, loads=tuple(loads), before=before)
+
+
+@functools.lru_cache(maxsize=16)
+def _densities(kind: Term, n: int) -> Batch:
+    """What a kind gives along n elements, evaluated at once."""
+    return Batch(densities_of(kind), n)
+
+
+def _has_densities(kind: Term) -> bool:
+    """Whether a kind gives forces or couples along an element."""
+    return kind.along_element and bool(densities_of(kind).size1_out(0))
 
 
 def _put(model: Any, group: Group, moments: Array, found: Mapping[str, Array]) -> None:
@@ -399,27 +426,31 @@ def inner_cut(mesh: Mesh, first: Mapping[str, int], load: Load) -> int | None:
     return first[member] + cut if 0 < cut < len(mesh.cuts[member]) - 1 else None
 
 
-def spread_of(expressions: Any, q: ca.MX, given: Any) -> tuple[ca.MX, ca.MX]:
-    """Distributed forces (axes, points of all elements) at given rotations, and the pull of the follower ones alone.
+def spread_of(expressions: Any, q: ca.MX, y: ca.MX, given: Any) -> tuple[ca.MX, ca.MX, ca.MX]:
+    """Distributed forces (axes, points of all elements) at a state, the pull of those that turn alone, and couples.
 
-    The first argument is an :class:`~sfetcas.mechanics.expressions.Expressions`.
+    The first argument is an :class:`~sfetcas.mechanics.expressions.Expressions`; couples are (turns, points).
     """
     model, axes, n = expressions.model, expressions.axes, expressions.points
     spread = ca.reshape(given.spread, axes, -1)
-    pull = ca.MX(*spread.shape)
+    pull, torque = ca.MX(*spread.shape), ca.MX(expressions.turns, spread.shape[1])
     for number, group in enumerate(model.terms):
-        if not group.kind.along_element:
+        if not _has_densities(group.kind):
             continue
         points = (elements_of(group)[:, None] * n + np.arange(n)).ravel()
-        forces = ca.reshape(expressions.load(number, given), axes, len(points))
-        turned = expressions.many(turned_vector(model.space), len(points))(q[:, group.turns.ravel().tolist()], forces)
+        sides = expressions.sides(group, q, expressions.retained_places(y, given))
+        data = ca.MX(given.data[number - 1])
+        function = expressions.many(densities_of(group.kind), len(group.data))
+        forces, couples = function(*sides, data, expressions.load(number, given))
+        turned = ca.reshape(forces, axes, len(points))
         beyond = ca.DM(-model.element.to_points / model.element.weights)
         onto = ca.DM.triplet(
             list(range(len(points))), points.tolist(), ca.DM.ones(len(points)), len(points), spread.shape[1]
         )
         spread += ca.mtimes(turned, onto)
         pull += ca.mtimes(ca.mtimes(turned, ca.kron(ca.DM.eye(len(group.data)), beyond)), onto)
-    return spread, pull
+        torque += ca.mtimes(ca.reshape(couples, expressions.turns, len(points)), onto)
+    return spread, pull, torque
 
 
 def elements_of(group: Group) -> Array:

@@ -53,6 +53,8 @@ class Loading:
         Minus the internal force at the integration points that the loads along the member cause.
     spread : ndarray (elements, points, axes)
         Distributed force times weight times length, from which ``pull`` is computed; for section forces.
+    torque : ndarray (elements, points, turns)
+        Couples along elements, times weight and length, that are in no term: of what turns, evaluated at a state.
     shift : ndarray (places * axes,)
         Prescribed displacements, zero for other places.
     turn : ndarray (rotations, 3)
@@ -63,6 +65,8 @@ class Loading:
         The kinds of these groups.
     factor : float
         The load factor at which they are; of sums and multiples the sum and the multiple.
+    before : tuple of ndarray (n, loads)
+        Where ``loads`` that turn are evaluated at a state, and so dead: what they were; else empty.
     """
 
     force: Array
@@ -73,11 +77,13 @@ class Loading:
     couple: Array
     pull: Array
     spread: Array
+    torque: Array
     shift: Array
     turn: Array
     loads: tuple[Array, ...]
     kinds: tuple[Term, ...]
     factor: float
+    before: tuple[Array, ...] = ()
 
     def scaled(self, factor: float) -> Loading:
         """All loads and prescribed motions times a factor."""
@@ -105,7 +111,7 @@ class Loading:
     @property
     def nodal(self) -> bool:
         """Whether it consists only of displacements of places, forces on them, and loads of terms."""
-        return not (self.pull.any() or self.of(lambda kind: not kind.is_load))
+        return not (self.pull.any() or self.of(lambda kind: not kind.proportional))
 
     @property
     def driven(self) -> float:
@@ -127,6 +133,7 @@ LOADS = (
     "couple",
     "pull",
     "spread",
+    "torque",
 )
 MOTIONS = ("shift", "turn")
 
@@ -149,7 +156,7 @@ class _Sums:
     def loading(self, connections: tuple[Group, ...], factor: float) -> Loading:
         """The sum of all shares."""
         kinds = tuple(group.kind for group in connections)
-        return Loading(**self.parts, loads=tuple(self.loads), kinds=kinds, factor=factor)
+        return Loading(**self.parts, loads=tuple(self.loads), kinds=kinds, factor=factor, before=())
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +185,7 @@ class _Writer:
             "couple": (places, 3),
             "pull": along,
             "spread": along,
+            "torque": (*self.beams.weight.shape, self.element.turns),
             "shift": (places * self.element.axes,),
             "turn": (turns, 3),
         }

@@ -13,7 +13,7 @@ from ..description.scene import Scene, check_scene
 from ..description.sections import breaks as kinks
 from ..description.showing import first_lines, shown
 from ..mathematics.arrays import Array, first_of_largest
-from .carried import carried
+from .carried import carried, magnetic, natural_turning
 
 __all__ = ["Cushion", "Mesh", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
 
@@ -157,6 +157,9 @@ def breaks_of(scene: Scene, member: str) -> Array:
         if load.member == member:
             places += list(load.part) if load.type == "distributed" else [] if load.at is None else [load.at]
             places += [] if load.profile is None else list(kinks(load.profile, scene.center_lines[member].length))
+    for table in (scene.actuations, scene.magnets):
+        for acting in table.values():
+            places += acting.breaks if acting.member == member else ()
     places = sorted(places)
     keep = [a for a, b in zip(places, places[1:], strict=False) if b - a > tolerances.DECIMAL]
     return np.array([*keep, 1.0])
@@ -226,9 +229,10 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
         if scene.members[name].type == "rigid" or section is None:
             cuts[name] = rigid_cuts(scene, name)
             continue
-        most = reaching[name].force
+        most = reaching[name].force + magnetic(scene, name)
         softest = float(np.nanmin(section.stiffness(np.linspace(0.0, 1.0, 5))))
         expected = line.turning + max(rotations, default=0.0) + reaching[name].moment * line.length / softest
+        expected += natural_turning(scene, name)
         # What turns with its load may bend to and fro all along; waves are as long as the layers are thick.
         waves = line.length * np.sqrt(most / softest) if follows else 0.0
         count = int(min(max(2.0, np.ceil((expected + waves) / turning)), 2000.0))

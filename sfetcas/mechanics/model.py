@@ -20,11 +20,13 @@ from ..description.showing import named, shown
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
+from .actuation import actuations_in
 from .beams import ELEMENT_DATA, Beams, Scales, beams_of, scales_of
 from .connections import connections_in, touches_in
 from .elements import Element, element_by_name
 from .load_terms import loads_in
 from .loading import Loading, unit_loadings
+from .magnetism import magnets_in
 from .mesh import Mesh
 from .parts import Parts
 from .positions import Positions, entries, place_nodes
@@ -38,7 +40,7 @@ from .unwrapping import Unwrapping, unwrapping_of
 __all__ = ["SOURCES", "Block", "Model", "assemble"]
 
 
-SOURCES: list[Callable[[Parts], Iterable[One]]] = [connections_in, touches_in, loads_in]
+SOURCES: list[Callable[[Parts], Iterable[One]]] = [connections_in, touches_in, loads_in, actuations_in, magnets_in]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
 
 

@@ -110,6 +110,8 @@ def cushioned(member: str, at: float) -> str:
 def _retained_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
     """Inner cuts of a member that loads need as places of their own: those that turn with the section."""
     inner = range(1, len(cuts) - 1)
+    if member in _pushed(scene):
+        return list(inner)
     following = [load for load in scene.loads.values() if load.member == member and load.follows]
     spread = [load.part for load in following if load.type == "distributed"]
     wanted = {cut for a, b in spread for cut in range(_nearest(cuts, a), _nearest(cuts, b) + 1)}
@@ -122,8 +124,22 @@ def _nearest(cuts: Array, place: float) -> int:
     return int(np.argmin(np.abs(cuts - place)))
 
 
+def _pushed(scene: Scene) -> set[str | None]:
+    """Members and nodes whose magnets are in fields that are not uniform, so that their places matter."""
+    if all(field.uniform for field in scene.fields.values()):
+        return set()
+    return {magnet.node if magnet.member is None else magnet.member for magnet in scene.magnets.values()}
+
+
 def _sprung(scene: Scene) -> Iterator[str]:
-    """Nodes whose displacement springs and small members act upon, and first nodes of what follows its section."""
+    """Nodes whose displacement springs, small members and magnets act upon, and first nodes of what follows its
+    section.
+    """
+    pushed = _pushed(scene)
+    yield from (magnet.node for magnet in scene.magnets.values() if magnet.node in pushed and magnet.node is not None)
+    for name in scene.members:
+        if name in pushed:
+            yield from scene.members[name].nodes
     for spring in scene.springs.values():
         if spring.type == "translational":
             yield from (node for node in (spring.node, spring.to) if node is not None)

@@ -19,7 +19,7 @@ import abc
 import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -37,6 +37,7 @@ __all__ = [
     "Term",
     "answers_of",
     "curvatures_of",
+    "densities_of",
     "energies_of",
     "grouped",
     "name_of",
@@ -49,7 +50,7 @@ __all__ = [
 Side = list[ca.SX]
 """Components of a rotation or of a vector."""
 
-Discrete = Literal["middle", "ends", "relative"]
+Discrete = Literal["middle", "ends", "relative", "strains"]
 """Where derivatives are taken between two states in the energy-momentum scheme, see :attr:`Term.discrete`."""
 
 GROUND = -1
@@ -96,7 +97,10 @@ class Term(Components, abc.ABC):
     """What a prescribed motion gives by its ``load``: ``angle`` or ``travel``; empty where it is no driven joint."""
 
     along_element: ClassVar[bool] = False
-    """Whether its loads are forces at the nodes of an element, whose rotations are its sides."""
+    """Whether it acts along an element, whose rotations are its sides, before the place at its start where it has one.
+
+    Its name ends on the number of the element.
+    """
 
     on_face: ClassVar[bool] = False
     """Whether its row keeps a place on the surface of an obstacle."""
@@ -111,7 +115,8 @@ class Term(Components, abc.ABC):
 
         ``middle``: at the mean state, to second order; ``ends``: the mean of those at both ends, exact for vectors that
         turn with one side; ``relative``: by the rotation of the second side relative to the first, or of one to the
-        ground, exact for rows that are linear in it, and in the plane for energies quadratic in the angle.
+        ground, exact for rows that are linear in it, and in the plane for energies quadratic in the angle; ``strains``:
+        exact for energies that are linear in the strains of an element, of whose :meth:`efforts` it knows.
         """
         return "middle"
 
@@ -133,6 +138,11 @@ class Term(Components, abc.ABC):
         such an angle.
         """
         return None
+
+    @property
+    def proportional(self) -> bool:
+        """Whether its forces are proportional to its loads, whatever the displacements."""
+        return self.is_load
 
     @property
     @abc.abstractmethod
@@ -163,10 +173,29 @@ class Term(Components, abc.ABC):
         return ca.SX(0)
 
     def work(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Minus the generalised forces times the displacements, to be reported with the energy; it is never
-        differentiated.
+        """What is to be reported with the energy and is never differentiated: minus the generalised forces times the
+        displacements, or a part of the energy that loads alone say.
         """
         return ca.SX(0)
+
+    def stored(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """The elastic part of the energy: what it is without loads, unless loads change what is free of stress."""
+        return ca.substitute(self.energy(q, u, data, load), load, ca.SX.zeros(load.shape))
+
+    def densities(
+        self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX
+    ) -> tuple[list[ca.SX], list[ca.SX]] | None:
+        """Of a kind along an element: forces and couples at its points, weights included, in the fixed axes.
+
+        None where it acts on nothing but the strains.
+        """
+        return None
+
+    def efforts(self, data: ca.SX, load: ca.SX) -> tuple[Any, ca.SX]:
+        """The element on whose strains it acts, and the derivatives (turns, points) of the energy by its curvatures
+        times its length, see :attr:`discrete`.
+        """
+        raise NotImplementedError
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """Quantities for the answer, in the order of :attr:`answers`, dimensionless; ``lam``: multipliers."""
@@ -347,6 +376,12 @@ def _energy(kind: Term) -> ca.SX:
 
 
 @functools.cache
+def _stored(kind: Term) -> ca.SX:
+    arguments, sides = _symbols(kind)
+    return kind.stored(*sides, arguments[2], arguments[3])
+
+
+@functools.cache
 def _expressions(kind: Term) -> tuple[list[ca.SX], ca.SX, ca.SX, ca.SX]:
     """Arguments, energy, rows and generalised forces of a kind."""
     arguments, sides = _symbols(kind)
@@ -400,7 +435,7 @@ def _rotation_gradient(kind: Term) -> ca.Function:
         stiffness += ca.mtimes(ca.jacobian(forces, x), basis) + _halves(forces, q.shape[1], kind.space)
     results = [
         energy + _work(kind),
-        ca.substitute(energy, arguments[3], ca.SX.zeros(arguments[3].shape)),
+        _stored(kind),
         ca.densify(rows),
         ca.densify(gradient),
         ca.densify(stiffness),
@@ -460,8 +495,7 @@ def _curvatures(kind: Term) -> ca.Function:
 def energies_of(kind: Term) -> ca.Function:
     """``(q, u, data, load) ->`` energy of a kind, and its part without loads."""
     arguments, energy = _symbols(kind)[0], _energy(kind)
-    stored = ca.substitute(energy, arguments[3], ca.SX.zeros(arguments[3].shape))
-    results, names = [energy + _work(kind), stored], ["energy", "stored"]
+    results, names = [energy + _work(kind), _stored(kind)], ["energy", "stored"]
     return _shared(f"energies_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], names)
 
 
@@ -479,3 +513,13 @@ def answers_of(kind: Term) -> ca.Function:
     found = kind.answer(*sides, *arguments[2:])
     name = f"answers_{name_of(kind)}"
     return ca.Function(name, arguments, [ca.densify(ca.vertcat(ca.SX(0, 1), *found))], [*ARGUMENTS], ["answers"])
+
+
+@functools.cache
+def densities_of(kind: Term) -> ca.Function:
+    """``(q, u, data, load) ->`` forces (axes * points,) and couples (turns * points,) along an element, fixed axes."""
+    arguments, sides = _symbols(kind)
+    found = kind.densities(*sides, *arguments[2:4])
+    results = [ca.densify(ca.vertcat(ca.SX(0, 1), *part)) for part in found or ([], [])]
+    name = f"densities_{name_of(kind)}"
+    return _shared(name, arguments[:4], results, [*ARGUMENTS[:4]], ["forces", "couples"])

@@ -139,7 +139,7 @@ def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
     spans = chosen if isinstance(chosen, Mapping) else dict.fromkeys(chosen)
     for name, span in spans.items():
         _check_asked(name, span)
-        if re.fullmatch(r"members\.[^.]+\.elements", name):
+        if re.fullmatch(r"members\.[^.]+\.elements|(actuations|magnets)\.[^.]+\.span(\.\d+)?", name):
             message = "found a number that changes the elements, and with them the unknowns"
             raise SceneError(f"{message}, accepted: one that leaves them as they are", ("arguments", name))
     return [
@@ -204,10 +204,12 @@ def single_numbers(scene: Scene, values: Mapping[str, ArrayLike]) -> dict[str, f
 
 def default_arguments(scene: Scene) -> list[str]:
     """Names of the default arguments: the load factor, the histories, all loads, and all prescribed motions."""
-    free = [one for table in (scene.loads, scene.motions) for one in table.values() if one.history is None]
+    free = [one for _, _, one in scene.driven if one.history is None]
     names = [FACTOR] if free or scene.gravity is not None else []
     names += [f"histories.{name}" for name in scene.histories]
     names += [f"loads.{name}.value" for name in scene.loads]
+    names += [f"actuations.{name}.value" for name in scene.actuations]
+    names += [f"fields.{name}.{'value' if field.value else 'moment'}" for name, field in scene.fields.items()]
     for name, motion in scene.motions.items():
         keys = ("displacement", "rotation")
         names += [f"motions.{name}.{key}" for key in keys if getattr(motion, key) is not None]
@@ -252,11 +254,16 @@ def _argument(scene: Scene, name: str, low: float | None, high: float | None) ->
     if isinstance(value, (list, tuple)):
         count = len(value)
         # Values along a member or over time are no vector, even where they are three.
-        vector = path[-1] in VECTORS and (path[-1] != "value" or (path[0] == "loads" and len(path) == 3))
+        vector = path[-1] in VECTORS and (path[-1] != "value" or (path[0] in VALUED and len(path) == 3))
         if scene.resolved_dimension == "plane" and count == 3 and vector:
             # What is out of the plane is no number of a plane scene; moments and rotations are about z.
             about = path[-1] == "rotation" or (path[0] == "loads" and scene.loads[path[1]].type == "moment")
             chosen = [2] if about else [0, 1]
+            if path[0] == "actuations" or path[-1] == "moment_density":
+                # Of the axes of the sections one is along z.
+                member = str(getattr(scene, path[0])[path[1]].member)
+                normal = scene.center_lines[member].bending_axis - 1
+                chosen = [normal] if path[0] == "actuations" else [i for i in range(3) if i != normal]
         else:
             chosen = list(range(count))
         values = tuple(float(value[i]) for i in chosen)
@@ -338,8 +345,21 @@ def _value(scene: Scene, path: Sequence[str], name: str) -> Any:
     return here
 
 
-VECTORS = ("value", "displacement", "rotation", "position", "gravity", "direction", "anchor")
+VECTORS = (
+    "value",
+    "displacement",
+    "rotation",
+    "position",
+    "gravity",
+    "direction",
+    "anchor",
+    "moment",
+    "moment_density",
+)
 """Keys of vectors."""
+
+VALUED = ("loads", "actuations", "fields")
+"""Tables whose records have a vector as their value."""
 
 UNITS = {
     "displacement": "m",
@@ -352,6 +372,9 @@ UNITS = {
     "G": "Pa",
     "rho": "kg/m3",
     "factor": "1",
+    "moment": "A m2",
+    "moment_density": "A m",
+    "gradient": "T/m",
 }
 """Units of numbers by their keys."""
 
@@ -360,6 +383,8 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
     key = next((part for part in reversed(path) if not part.isdigit()), "")
     if path[0] == "loads" and key == "value":
         return {"force": "N", "moment": "N m", "distributed": "N/m"}[scene.loads[path[1]].type]
+    if path[0] in ("actuations", "fields") and key == "value":
+        return {"actuations": "1/m", "fields": "T"}[path[0]]
     if path[0] == "springs" and len(path) > 2:
         turning = scene.springs[path[1]].type == "rotational"
         return {"stiffness": "N m" if turning else "N/m", "rest": "rad" if turning else "m"}.get(key, "m")
@@ -376,6 +401,7 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
 
 def _meaning(path: Sequence[str]) -> str:
     kinds = {"loads": "load", "motions": "motion", "sections": "section", "nodes": "node", "springs": "spring"}
+    kinds |= {"actuations": "actuation", "fields": "field", "magnets": "magnet"}
     if len(path) < 2:
         return path[0]
     return f"{'.'.join(path[2:])} of the {kinds.get(path[0], path[0])} {path[1]}"

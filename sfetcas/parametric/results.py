@@ -18,9 +18,10 @@ from ..description.records import unknown
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers
-from ..mathematics.constants import times
+from ..mathematics.constants import sparse, times
 from ..mechanics.connections import connections_of
-from ..mechanics.load_terms import spread_of
+from ..mechanics.load_terms import elements_of, spread_of
+from ..mechanics.magnetism import magnet_terms
 from ..mechanics.model import Model
 from ..mechanics.reactions import Reactions
 from ..mechanics.singles import fibre_strain, turned_vector
@@ -106,6 +107,7 @@ WHOSE = {
     "members": "of the member",
     "springs": "of the spring",
     "motions": "of the motion",
+    "magnets": "of the magnet",
     "energy": "energy",
 }
 """How the meaning of a result goes on after its key."""
@@ -321,6 +323,8 @@ class _Outputs:
             return self._tangent(kind.table, record)
         if kind.table == "springs":
             return self._connection("springs", record, key)
+        if kind.table == "magnets":
+            return self._magnet(record, key)
         tables = {"nodes": self._node, "reactions": self._reaction, "members": self._member, "motions": self._motion}
         return tables[kind.table](record, key)
 
@@ -451,10 +455,31 @@ class _Outputs:
         sections, scene = self._sections[member], self._model.scene
         change = self._results.bent(member, moment, turned, sections)
         if key == "curvature":
-            return (sections[9:12, :] / scene.size + change).T
+            return (sections[9:12, :] / scene.size + self._natural(member) + change).T
         shape = scene.sections[str(scene.members[member].section)].shape
         strain = self._expressions.many(fibre_strain(shape != "rectangle"), change.shape[1])(change, sections[22:, :])
         return (strain * sections[21, :] if key == "bending_stress" else strain).T
+
+    def _natural(self, member: str) -> ca.MX:
+        """Natural twist and curvature, (3, places), 1/m, that actuations add."""
+        model, expressions, at = self._model, self._expressions, self._stations(member)
+        part, n = model.elements_of(member), expressions.points
+        values = ca.MX(expressions.turns, n * (part.stop - part.start))
+        for number, group in enumerate(model.terms):
+            if group.kind.table != "actuations":
+                continue
+            of_element = elements_of(group) - part.start
+            own = np.flatnonzero((of_element >= 0) & (of_element < part.stop - part.start))
+            if len(own):
+                points = (of_element[own][:, None] * n + np.arange(n)).ravel()
+                every = (own[:, None] * n + np.arange(n)).ravel()
+                load = ca.reshape(expressions.load(number, self._program.given), expressions.turns, -1)
+                onto = sparse(np.arange(len(points)), points, np.ones(len(points)), (len(points), values.shape[1]))
+                values += ca.mtimes(load[:, every.tolist()], onto)
+        fixed = self._about(ca.mtimes(values, ca.sparsify(ca.DM(self._within(member, at.at_points))).T))
+        sections = self._sections[member]
+        rows = [ca.sum1(sections[12 + 3 * k : 15 + 3 * k, :] * fixed) for k in range(3)]
+        return ca.vertcat(*rows) / model.scales.length
 
     def _rotations(self, member: str) -> ca.MX:
         model, at = self._model, self._stations(member)
@@ -464,15 +489,15 @@ class _Outputs:
         return ca.horzcat(*found).T
 
     @functools.cached_property
-    def _spread(self) -> tuple[ca.MX, ca.MX]:
-        """Distributed forces at the points of all elements and the whole pull there, (axes, points)."""
-        spread, pull = spread_of(self._expressions, self._q, self._program.given)
-        return spread, self._found.pull + pull
+    def _spread(self) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """Distributed forces at the points of all elements, the whole pull there (axes, points), couples of loads."""
+        spread, pull, torque = spread_of(self._expressions, self._q, self._y, self._program.given)
+        return spread, self._found.pull + pull, torque
 
     def _force(self, member: str) -> ca.MX:
         """Internal force at the places, (3, places)."""
         at, n = self._stations(member), self._expressions.points
-        spread, pull = self._spread
+        spread, pull, _ = self._spread
         first = (n * (self._model.elements_of(member).start + at.elements)).tolist()
         return self._three(self._points(spread, member, self._within(member, at.spread)) - pull[:, first])
 
@@ -481,12 +506,12 @@ class _Outputs:
         expressions, model = self._expressions, self._model
         at = self._stations(member)
         own = self._found.moments(expressions.points * (model.elements_of(member).start + at.elements))
-        pull = self._spread[1]
+        _, pull, torque = self._spread
         if model.space:
             crossed = ca.cross(self._tangents, pull, 1)
         else:
             crossed = self._tangents[0, :] * pull[1, :] - self._tangents[1, :] * pull[0, :]
-        gained = self._points(crossed, member, self._within(member, at.gained)) - own
+        gained = self._points(crossed - torque, member, self._within(member, at.gained)) - own
         return self._about(gained)
 
     # -- springs ------------------------------------------------------------------------------------
@@ -508,6 +533,23 @@ class _Outputs:
         )
         k = list(group.kind.answers).index(key)
         return found[k] * self._model.scales.of(group.kind.answers[key])
+
+    def _magnet(self, name: str, key: str) -> ca.MX:
+        """Energy, torque or force that fields give a magnet."""
+        expressions, model, total = self._expressions, self._model, ca.MX.zeros(7)
+        given, places = self._program.given, expressions.retained_places(self._y, self._program.given)
+        for connection, own in magnet_terms(model.connections, name):
+            number, group = connection + 1, model.connections[connection]
+            arguments = [*expressions.arguments(number, self._q, places, given, self._unwrapped)]
+            nothing = ca.MX(0, len(group.data))
+            found = expressions.many(answers_of(group.kind), len(group.data))(*arguments, nothing)
+            total += ca.sum2(found[:, own])
+        rows, unit = {
+            "energy": (slice(0, 1), model.scales.moment),
+            "torque": (slice(1, 4), model.scales.moment),
+            "force": (slice(4, 7), model.scales.force),
+        }[key]
+        return total[rows].T * unit
 
     # -- stiffness ----------------------------------------------------------------------------------
 

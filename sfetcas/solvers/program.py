@@ -22,6 +22,7 @@ from ..mathematics.linear import pattern
 from ..mechanics.beams import ELEMENT_DATA
 from ..mechanics.equations import UNLOADED, State
 from ..mechanics.expressions import LOADS, Expressions, Given, moved_by
+from ..mechanics.load_terms import elements_of
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import RotationFreedom
@@ -170,7 +171,15 @@ class Program:
         expressions = self.expressions
         if not expressions.elements:
             return ca.MX(1, 0)
-        return expressions.many(energies_of(self.model.element), expressions.elements)(*self._arguments[0])[1]
+        found = expressions.many(energies_of(self.model.element), expressions.elements)(*self._arguments[0])[1]
+        for number, group in enumerate(self.model.terms):
+            if group.kind.table == "actuations":
+                energies = expressions.many(energies_of(group.kind), len(group.data))(*self._arguments[number])[1]
+                rows, count = elements_of(group), len(group.data)
+                found += times(
+                    sparse(rows, np.arange(count), np.ones(count), (expressions.elements, count)), energies.T
+                ).T
+        return found
 
     @property
     def strain(self) -> ca.MX:

@@ -1,0 +1,244 @@
+"""Actuation of members by themselves: natural curvature and twist; magnets, and the magnetic fields around them."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, model_validator
+
+from .. import tolerances
+from ..errors import SceneError
+from ..mathematics.arrays import numbers
+from .records import Direction, Record, Turn, Vector, listed, number, say
+from .sections import Quantity, Varying, breaks, evaluate
+
+__all__ = ["PERMEABILITY", "Actuation", "Magnet", "MagneticField"]
+
+
+def _span(value: Any) -> tuple[float, float]:
+    accepted = "[from, to], rising fractions of the length, from 0 to 1"
+    ends = tuple(number(entry) for entry in listed(value, accepted))
+    if len(ends) != 2 or not 0.0 <= ends[0] < ends[1] <= 1.0:
+        raise ValueError(f"found {say(value)}, accepted: {accepted}")
+    return ends[0], ends[1]
+
+
+def _gradient(value: Any) -> tuple[tuple[float, ...], ...]:
+    accepted = "three rows of three numbers: the derivatives of each component by x, y and z"
+    rows = tuple(tuple(number(entry) for entry in listed(row, accepted)) for row in listed(value, accepted))
+    if [len(row) for row in rows] != [3, 3, 3]:
+        raise ValueError(f"found {say(value)}, accepted: {accepted}")
+    return rows
+
+
+Span = Annotated[tuple[float, float], BeforeValidator(_span)]
+Gradient = Annotated[tuple[tuple[float, ...], ...], BeforeValidator(_gradient)]
+
+WHOLE = (0.0, 1.0)
+"""All of a member."""
+
+
+def _profile(profile: Quantity | None, x: ArrayLike) -> NDArray[np.float64]:
+    """Values (n,) of a profile at fractions x (n,) of the length; one without a profile."""
+    return evaluate(1.0 if profile is None else profile, x)
+
+
+def _kinks(profile: Quantity | None, span: tuple[float, float]) -> tuple[float, ...]:
+    """Fractions of the length at which what has a profile and a span begins, ends, or has a kink."""
+    return (*span, *(() if profile is None else breaks(profile)))
+
+
+class Actuation(Record):
+    """Natural curvature and twist of a member, added to what its shape has.
+
+    The member is free of moments where it is bent and twisted by just as much.  Chambers under pressure, heat, swelling
+    and growth, and strips of two materials are given so.
+
+    Parameters
+    ----------
+    member : name
+        Name of the flexible member.
+    value : (3,), 1/m, about b1 (twist), b2 and b3 of the sections
+        What is added to the natural twist and curvature at factor 1.  One number is the curvature about b3.
+    span : (2,), fractions of the length
+        ``[from, to]``: the part of the member that it acts on.  Default: all of it.
+    profile : number or varying
+        Factor along the member.
+    history : name
+        Name of a history that replaces the load factor of the step.
+
+    Examples
+    --------
+    >>> Actuation(member="finger", value=3.0, span=[0.2, 0.8]).vector
+    (0.0, 0.0, 3.0)
+    """
+
+    member: str
+    value: Turn
+    span: Span = WHOLE
+    profile: Varying | None = None
+    history: str | None = None
+
+    @property
+    def vector(self) -> tuple[float, float, float]:
+        """The value with three components (3,), 1/m, about b1, b2, b3; a single number is the curvature about b3."""
+        return self.value if isinstance(self.value, tuple) else (0.0, 0.0, self.value)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Fractions of the length at which it begins, ends, or has a kink."""
+        return _kinks(self.profile, self.span)
+
+    def along(self, x: ArrayLike) -> NDArray[np.float64]:
+        """Natural twist and curvature (n, 3), 1/m, section axes, at fractions x (n,) of the length, without span."""
+        return _profile(self.profile, x)[:, None] * numbers(self.vector)
+
+
+class MagneticField(Record):
+    """A magnetic field that is given: uniform, with a constant gradient, or that of a dipole.
+
+    The magnets of the scene do not change it, and do not act on each other.
+
+    Parameters
+    ----------
+    type : text
+        ``uniform``; ``linear``: ``value`` at ``position``, and from there it changes by ``gradient``; ``dipole``: of
+        a small magnet at ``position``, with the dipole ``moment``.
+    value : (3,), T, fixed axes
+        The field at factor 1; of a linear one at ``position``.
+    gradient : (3, 3), T/m, fixed axes
+        Of a linear field: derivatives of each component (rows) by x, y and z.  Symmetric and with zero trace, as of
+        every field in air.
+    position : (3,), m, fixed axes
+        Of a linear field where it has the ``value``; of a dipole its place.  Default: the origin.
+    moment : (3,), A m², fixed axes
+        Of a dipole.
+    history : name
+        Name of a history that replaces the load factor of the step.
+
+    Examples
+    --------
+    >>> MagneticField(type="dipole", position=[0, 0, 0.1], moment=[0, 0, 1]).of([0, 0, 0]).round(9)
+    array([0.    , 0.    , 0.0002])
+    """
+
+    type: Literal["uniform", "linear", "dipole"] = "uniform"
+    value: Vector | None = None
+    gradient: Gradient | None = None
+    position: Vector = (0.0, 0.0, 0.0)
+    moment: Direction | None = None
+    history: str | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> MagneticField:
+        needed = {"uniform": ("value",), "linear": ("gradient",), "dipole": ("moment",)}[self.type]
+        useless = {
+            "uniform": ("gradient", "moment", "position"),
+            "linear": ("moment",),
+            "dipole": ("value", "gradient"),
+        }[self.type]
+        for key in needed:
+            if getattr(self, key) is None:
+                raise SceneError(f"the key {key!r} is missing: a field of type {self.type!r} needs it")
+        for key in useless:
+            if key in self.model_fields_set and getattr(self, key) is not None:
+                raise SceneError(f"not accepted: the field is of type {self.type!r}", (key,))
+        if self.gradient is not None:
+            slopes = np.array(self.gradient)
+            small = tolerances.WRITTEN * np.abs(slopes).max()
+            if np.abs(slopes - slopes.T).max() > small or abs(np.trace(slopes)) > small:
+                accepted = "a symmetric matrix with zero trace, as of every field in air"
+                raise SceneError(f"found {say(self.gradient)}, accepted: {accepted}", ("gradient",))
+        return self
+
+    @property
+    def uniform(self) -> bool:
+        """Whether it is the same everywhere, so that it exerts no forces."""
+        return self.type == "uniform"
+
+    @property
+    def vector(self) -> tuple[float, float, float]:
+        """Its value (3,), T, zero where none is given."""
+        return self.value or (0.0, 0.0, 0.0)
+
+    def of(self, place: ArrayLike) -> NDArray[np.float64]:
+        """The field (..., 3), T, at places (..., 3), m, in the fixed axes, at factor 1."""
+        apart = np.asarray(place, dtype=float) - np.array(self.position)
+        if self.type == "dipole":
+            moment = np.array(self.moment)
+            distance = np.linalg.norm(apart, axis=-1, keepdims=True)
+            along = (apart @ moment)[..., None] / distance**2
+            return np.asarray(PERMEABILITY * (3.0 * along * apart - moment) / distance**3)
+        slopes = np.zeros((3, 3)) if self.gradient is None else np.array(self.gradient)
+        return np.asarray(np.array(self.vector) + apart @ slopes.T)
+
+    @property
+    def size(self) -> float:
+        """A magnitude, T, or of a dipole T m³."""
+        if self.type == "dipole" and self.moment is not None:
+            return PERMEABILITY * math.hypot(*self.moment)
+        return math.hypot(*self.vector)
+
+
+PERMEABILITY = 1e-7
+"""Magnetic constant over 4 pi, T m/A."""
+
+
+class Magnet(Record):
+    """A magnetised member, or a magnetic dipole at a node; it turns with what carries it.
+
+    Parameters
+    ----------
+    member : name
+        Name of the magnetised member, flexible or rigid.
+    node : name
+        Instead of a member: name of the node at which a dipole is.
+    moment : (3,), A m², fixed axes of the undeformed scene
+        Of a dipole at a node, with which it turns.
+    moment_density : (3,), A m, along b1 (the tangent), b2 and b3 of the sections
+        Of a member: magnetic moment (A m²) per metre, the magnetisation (A/m) times the area.
+    span : (2,), fractions of the length
+        ``[from, to]``: the part of the member that is magnetised.  Default: all of it.
+    profile : number or varying
+        Of a member: factor along it.
+    """
+
+    member: str | None = None
+    node: str | None = None
+    moment: Direction | None = None
+    moment_density: Direction | None = None
+    span: Span = WHOLE
+    profile: Varying | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Magnet:
+        if (self.member is None) == (self.node is None):
+            found = "neither member nor node is given" if self.node is None else "found the keys 'member' and 'node'"
+            raise SceneError(f"{found}, accepted: one of them, which carries the magnet")
+        needed, other = ("moment", "moment_density") if self.member is None else ("moment_density", "moment")
+        where = "at a node" if self.member is None else "along a member"
+        if getattr(self, needed) is None:
+            raise SceneError(f"the key {needed!r} is missing: the magnet is {where}")
+        for key in (other, *(("span", "profile") if self.member is None else ())):
+            if key in self.model_fields_set and getattr(self, key) is not None:
+                raise SceneError(f"not accepted: the magnet is {where}", (key,))
+        return self
+
+    @property
+    def vector(self) -> tuple[float, float, float]:
+        """Its moment (3,), A m², or along a member moment per length, A m."""
+        found = self.moment if self.member is None else self.moment_density
+        assert found is not None
+        return found
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Fractions of the length at which it begins, ends, or has a kink."""
+        return _kinks(self.profile, self.span)
+
+    def along(self, x: ArrayLike) -> NDArray[np.float64]:
+        """Moment per length (n, 3), A m, section axes, at fractions x (n,) of the length, without span."""
+        return _profile(self.profile, x)[:, None] * numbers(self.vector)

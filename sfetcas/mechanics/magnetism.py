@@ -1,0 +1,268 @@
+"""Magnetised members and magnetic dipoles in given fields, as terms.
+
+Energy is minus the moment times the field, ``- (R m).B(x)``, counted from the undeformed scene.  In a uniform field
+only rotations matter; members integrate it at the nodes of their elements.  In other fields the places matter, too:
+within an element they follow from the place at its start and the turned tangents, as its chord does, so that forces
+and couples are exactly the derivatives of one energy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, final
+
+import casadi as ca
+import numpy as np
+
+from ..description.actuation import PERMEABILITY, Magnet, MagneticField
+from ..errors import SceneError
+from ..mathematics import interpolation, quaternion
+from ..mathematics.arrays import Array, numbers
+from .actuation import inside, points_of
+from .parts import Parts
+from .terms import Discrete, Group, One, Side, Term
+
+__all__ = ["Dipole", "Magnetised", "magnet_terms", "magnets_in"]
+
+Law = Literal["uniform", "linear", "dipole"]
+"""How a field depends on the place, as the types of :class:`~sfetcas.MagneticField`."""
+
+
+@dataclass(frozen=True)
+class _InField(Term):
+    """What magnets have in common.
+
+    Attributes
+    ----------
+    law : str
+        How the field depends on the place.  Its numbers are the load: the field, T; of a linear one then its change
+        along a unit of length, row by row; of a dipole its strength at a unit of length, T.
+    """
+
+    table: ClassVar[str] = "magnets"
+    answers: ClassVar[Mapping[str, str]] = {
+        "energy": "J",
+        **{f"torque_{axis}": "N m" for axis in "xyz"},
+        **{f"force_{axis}": "N" for axis in "xyz"},
+    }
+
+    law: Law
+
+    @property
+    def proportional(self) -> bool:
+        """Whether only rotations matter: displacements that motions prescribe change what other fields do."""
+        return self.law == "uniform"
+
+    @property
+    def discrete(self) -> Discrete:
+        """In a uniform field only vectors that turn."""
+        return "ends" if self.law == "uniform" else "middle"
+
+    @property
+    def strengths(self) -> int:
+        """How many numbers a field has."""
+        return self.axes + (self.axes**2 if self.law == "linear" else 0)
+
+    def field(self, load: ca.SX, x: ca.SX) -> ca.SX:
+        """The field, T, at a place relative to its position, over the unit of length."""
+        if self.law == "uniform":
+            return load
+        if self.law == "linear":
+            return load[: self.axes] + ca.mtimes(ca.reshape(load[self.axes :], self.axes, self.axes).T, x)
+        square = ca.dot(x, x)
+        return (3.0 * ca.dot(load, x) / square * x - load) / (square * ca.sqrt(square))
+
+    def magnets(self, q: list[Side], u: list[Side], data: ca.SX) -> list[tuple[ca.SX, ca.SX, ca.SX, ca.SX]]:
+        """Of each of its points: moment, place, and the same in the undeformed scene."""
+        raise NotImplementedError
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Minus moments times fields, and what that is in the undeformed scene."""
+        found = ca.SX(0)
+        for moment, place, rest, start in self.magnets(q, u, data):
+            # In a uniform field the difference of the moments keeps its digits where they are small.
+            if self.law == "uniform":
+                found -= ca.dot(moment - rest, load)
+            else:
+                found -= ca.dot(moment, self.field(load, place)) - ca.dot(rest, self.field(load, start))
+        return found
+
+    def acting(
+        self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX
+    ) -> tuple[list[ca.SX], list[ca.SX], list[ca.SX]]:
+        """Energy, force and couple of each of its points, in the fixed axes."""
+        energies, forces, couples = [], [], []
+        for moment, place, _, _ in self.magnets(q, u, data):
+            field, x = self.field(load, place), ca.SX.sym("x", self.axes)
+            slopes = ca.substitute(ca.jacobian(self.field(load, x), x), x, place)
+            energies.append(-ca.dot(moment, field))
+            forces.append(ca.mtimes(slopes.T, moment))
+            couples.append(ca.cross(moment, field) if self.space else moment[0] * field[1] - moment[1] * field[0])
+        return energies, forces, couples
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """Energy, torque about the places of the magnets, and force."""
+        energies, forces, couples = (sum(part[1:], part[0]) for part in self.acting(q, u, data, load))
+        nothing = [ca.SX(0), ca.SX(0)]
+        torque = ca.vertsplit(couples) if self.space else [*nothing, couples]
+        return [energies, *torque, *[*ca.vertsplit(forces), ca.SX(0)][:3]]
+
+
+@final
+@dataclass(frozen=True)
+class Magnetised(_InField):
+    """Magnetised material along an element.
+
+    Data: moments at the nodes, weights included; where places matter also turned tangents of the undeformed scene,
+    weights included, and places of the nodes there relative to that of the field.
+
+    Attributes
+    ----------
+    nodes : int
+        Nodes of the element, which integrates at them.
+    """
+
+    along_element: ClassVar[bool] = True
+
+    nodes: int
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """The rotations of the element, and where places matter the place at its start."""
+        moves = self.law != "uniform"
+        return self.nodes, int(moves), 0, self.axes * self.nodes * (3 if moves else 1), self.strengths
+
+    def magnets(self, q: list[Side], u: list[Side], data: ca.SX) -> list[tuple[ca.SX, ca.SX, ca.SX, ca.SX]]:
+        """Of each node: moment, place, and the same in the undeformed scene."""
+        parts = [ca.reshape(part, self.axes, self.nodes) for part in ca.vertsplit(data, self.axes * self.nodes)]
+        moments = [ca.vertcat(*self.forth(side, ca.vertsplit(parts[0][:, k]))) for k, side in enumerate(q)]
+        if self.law == "uniform":
+            nowhere = ca.SX.zeros(self.axes)
+            return [(moment, nowhere, parts[0][:, k], nowhere) for k, moment in enumerate(moments)]
+        nodes, weights = interpolation.lobatto(self.nodes)
+        onto = interpolation.integration(nodes, nodes) / weights
+        turned = [ca.vertcat(*self.forth(side, ca.vertsplit(parts[1][:, k]))) for k, side in enumerate(q)]
+        gained = ca.horzcat(*turned) - parts[1]
+        moved = ca.repmat(ca.vertcat(*u[0]), 1, self.nodes) + ca.mtimes(gained, ca.DM(onto.T))
+        start = parts[2]
+        return [(moment, (start + moved)[:, k], parts[0][:, k], start[:, k]) for k, moment in enumerate(moments)]
+
+    def densities(
+        self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX
+    ) -> tuple[list[ca.SX], list[ca.SX]] | None:
+        """Forces and couples at the nodes."""
+        _, forces, couples = self.acting(q, u, data, load)
+        return forces, couples
+
+
+@final
+@dataclass(frozen=True)
+class Dipole(_InField):
+    """A dipole that turns with a rotation.
+
+    Data: its moment; where places matter also its place in the undeformed scene relative to that of the field.
+    """
+
+    one_sided: ClassVar[bool] = True
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """A rotation, and where places matter a place."""
+        moves = self.law != "uniform"
+        return 1, int(moves), 0, self.axes * (2 if moves else 1), self.strengths
+
+    def magnets(self, q: list[Side], u: list[Side], data: ca.SX) -> list[tuple[ca.SX, ca.SX, ca.SX, ca.SX]]:
+        """Its moment and place, and the same in the undeformed scene."""
+        rest = data[: self.axes]
+        moment = ca.vertcat(*self.forth(q[0], ca.vertsplit(rest)))
+        if self.law == "uniform":
+            nowhere = ca.SX.zeros(self.axes)
+            return [(moment, nowhere, rest, nowhere)]
+        start = data[self.axes :]
+        return [(moment, start + ca.vertcat(*u[0]), rest, start)]
+
+
+# -- of a scene -------------------------------------------------------------------------------------
+
+
+def magnets_in(parts: Parts) -> Iterator[One]:
+    """Terms of the magnets of a scene, each under the name ``magnets.NAME``, along a member with ``element NUMBER``.
+
+    Raises
+    ------
+    SceneError
+        Magnetised members with Gauss integration, or a dipole at a node without a rotation of its own.
+    """
+    scene = parts.scene
+    for name, magnet in scene.magnets.items():
+        for law, position, loads in _laws(scene.fields, parts):
+            found = _at_node if magnet.member is None else _along_member
+            yield from found(parts, name, magnet, law, position, loads)
+
+
+def _laws(fields: Mapping[str, MagneticField], parts: Parts) -> list[tuple[Law, Array, dict[str | None, Any]]]:
+    """Kind, position (m) and load of each field by its history; all uniform fields add up to one."""
+    axes, unit = parts.element.axes, parts.scales.length
+    found: list[tuple[Law, Array, dict[str | None, Any]]] = []
+    uniform: dict[str | None, Any] = {}
+    for field in fields.values():
+        position = numbers(field.position)[:axes]
+        if field.uniform:
+            value = numbers(field.vector)[:axes]
+            uniform[field.history] = uniform[field.history] + value if field.history in uniform else value
+        elif field.type == "dipole":
+            load = PERMEABILITY * numbers(field.moment)[:axes] / unit**3
+            found.append(("dipole", position, {field.history: load}))
+        else:
+            slopes = numbers(field.gradient)[:axes, :axes] * unit
+            load = np.concatenate([numbers(field.vector)[:axes], slopes.ravel()])
+            found.append(("linear", position, {field.history: load}))
+    return [("uniform", np.zeros(axes), uniform), *found] if uniform else found
+
+
+def _at_node(
+    parts: Parts, name: str, magnet: Magnet, law: Law, position: Array, loads: Mapping[str | None, Array]
+) -> Iterator[One]:
+    axes, node = parts.element.axes, str(magnet.node)
+    turn = parts.rotations.node_turn[node]
+    if turn is None:
+        raise SceneError(f"nothing turns with node {node!r}, so no dipole can be there", ("magnets", name))
+    data, places = [numbers(magnet.vector)[:axes] / parts.scales.moment], tuple[int, ...]()
+    if law != "uniform":
+        data.append((numbers(parts.scene.nodes[node].position)[:axes] - position) / parts.scales.length)
+        places = (parts.segments.place(node),)
+    kind = Dipole(parts.element.space, law)
+    yield One(kind, f"magnets.{name}", node, np.concatenate(data), (turn,), places, loads=loads)
+
+
+def _along_member(
+    parts: Parts, name: str, magnet: Magnet, law: Law, position: Array, loads: Mapping[str | None, Array]
+) -> Iterator[One]:
+    scene, element, member = parts.scene, parts.element, str(magnet.member)
+    if element.gauss:
+        raise SceneError("magnetised members need integration at the nodes, found Gauss integration")
+    x, line, first = points_of(parts, member), scene.center_lines[member], parts.beams.first[member]
+    frames, axes = line.quaternions(x.ravel()), element.axes
+    density = quaternion.rotate(frames, magnet.along(x.ravel()))[:, :axes].reshape(*x.shape, axes)
+    places = (line.positions(x.ravel())[:, :axes] - position).reshape(*x.shape, axes) / parts.scales.length
+    kind = Magnetised(element.space, law, element.order + 1)
+    for e in np.flatnonzero(inside(parts, member, magnet.span)).tolist():
+        number = first + e
+        weight = parts.beams.weight[number][:, None] * (parts.scales.length / parts.scales.moment)
+        data, starts = [(density[e] * weight).ravel()], tuple[int, ...]()
+        if law != "uniform":
+            data += [parts.beams.tangent[number].ravel(), places[e].ravel()]
+            starts = (parts.segments.place(parts.segments.parts[parts.segments.owner[number]].start),)
+        sides = tuple(parts.rotations.turns[number].tolist())
+        yield One(kind, f"magnets.{name} element {number}", "", np.concatenate(data), sides, starts, loads=loads)
+
+
+def magnet_terms(groups: Sequence[Group], name: str) -> Iterator[tuple[int, list[int]]]:
+    """For each group with terms of a magnet: number of the group, numbers of the terms in it."""
+    whole = f"magnets.{name}"
+    for number, group in enumerate(groups):
+        if group.kind.table == "magnets":
+            own = [i for i, one in enumerate(group.names) if one == whole or one.rpartition(" element ")[0] == whole]
+            if own:
+                yield number, own
