@@ -7,13 +7,14 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from .. import tolerances
-from ..mathematics.arrays import Array
-from ..mathematics.quaternion import rotate
+from ..mathematics.arrays import Array, values_of
+from ..mathematics.quaternion import matrix, rotate
 from .contacts import Contact
 from .loads import Load, Motion
 from .shapes import CenterLine
 from .springs import Spring
 from .structure import Member, Node
+from .tendons import Tendon, Way, offsets
 
 __all__ = ["out_of_plane"]
 
@@ -31,6 +32,7 @@ def out_of_plane(
     members: Mapping[str, Member],
     contacts: Mapping[str, Contact],
     rotating: Triple | None,
+    tendons: Mapping[str, Tendon],
 ) -> Finding | None:
     """Place in the scene and description of the first thing that does not lie in x-y; None where all does."""
     if gravity is not None and _leaves(gravity):
@@ -46,6 +48,7 @@ def out_of_plane(
         _springs(springs),
         _cylindrical(nodes, members),
         _contacts(contacts),
+        _tendons(tendons, lines),
     )
     return next((finding for group in findings for finding in group), None)
 
@@ -137,6 +140,25 @@ def _contacts(contacts: Mapping[str, Contact]) -> Iterator[Finding]:
             yield ("contacts", name, "axis"), "is not along z"
         if contact.type == "sphere" and contact.center is not None and contact.center[2] != 0.0:
             yield ("contacts", name, "center"), "has a z component"
+
+
+def _tendons(tendons: Mapping[str, Tendon], lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
+    for name, tendon in tendons.items():
+        for i, way in enumerate(tendon.way):
+            if any(_leaves(arm) for arm in _arms(way, lines)):
+                yield ("tendons", name, "way", str(i)), "leaves x-y"
+
+
+def _arms(way: Way, lines: Mapping[str, CenterLine]) -> Iterator[Triple | Array]:
+    """Points of the ground, or arms along the way, in the fixed axes."""
+    if way.ground is not None:
+        yield way.ground
+    elif way.node is not None:
+        yield np.array([*map(float, way.offset or ()), 0.0, 0.0, 0.0])[:3]  # type: ignore[arg-type]
+    elif way.member is not None:
+        x = np.linspace(*way.ends, 9) if not way.holes else np.array(way.holes)
+        frames, across = matrix(lines[way.member].quaternions(x)), values_of(offsets(way, x, x)[0])
+        yield from np.einsum("nij,nj->ni", frames[:, :, 1:], across)
 
 
 def _leaves(vector: Triple | Array) -> bool:

@@ -100,7 +100,7 @@ class Element(Term):
         """Strain energy, plus the potential of the loads by their pulls."""
         stiffness, tangent = self.split(data)
         pull = ca.reshape(load, self.axes, self.order + 1)
-        here, slope = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
+        here, slope = self.at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
         energy = ca.SX(0)
         for k in range(self.order + 1):
             energy += self._strain_energy(here[:, k], slope[:, k], stiffness[:, k])
@@ -110,7 +110,7 @@ class Element(Term):
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """Change of the chord, the vector from the first to the last node, since the undeformed scene."""
         tangent = self.split(data)[1]
-        here = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))[0]
+        here = self.at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))[0]
         gained = [self._tangent(here[:, k], tangent[:, k]) - tangent[:, k] for k in range(self.order + 1)]
         return ca.vertsplit(sum(gained[1:], gained[0]))
 
@@ -120,13 +120,13 @@ class Element(Term):
         stiffness, tangent = ca.vertsplit(data, [0, n * self.stiffnesses, data.shape[0]])
         return ca.reshape(stiffness, self.stiffnesses, n), ca.reshape(tangent, self.axes, n)
 
-    def _at_points(self, q: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def at_points(self, q: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Rotation and its derivative by xi at the integration points."""
         slope = ca.mtimes(q, ca.DM(interpolation.differentiation(self.nodes, self.points).T))
         here = ca.mtimes(q, ca.DM(interpolation.evaluation(self.nodes, self.points).T)) if self.gauss else q
         return here, slope
 
-    def _curvature(self, here: ca.SX, slope: ca.SX) -> ca.SX:
+    def curvature(self, here: ca.SX, slope: ca.SX) -> ca.SX:
         """Change of the curvature times length at one point in space, about the fixed axes of the undeformed scene."""
         q = ca.vertsplit(here)
         k = 2.0 * ca.vertcat(*product([q[0], -q[1], -q[2], -q[3]], ca.vertsplit(slope))[1:])
@@ -160,7 +160,7 @@ class Element(Term):
         """``(q, tangent) ->`` rotated tangents of the points, (axes, p + 1)."""
         n = self.order + 1
         q, tangent = ca.SX.sym("q", self.components, n), ca.SX.sym("tangent", self.axes, n)
-        here = self._at_points(q)[0]
+        here = self.at_points(q)[0]
         found = ca.horzcat(*[self._tangent(here[:, k], tangent[:, k]) for k in range(n)])
         return ca.Function(f"turned_{name_of(self)}", [q, tangent], [ca.densify(found)])
 
@@ -230,7 +230,7 @@ class Element(Term):
         if self.space:
             return self._function("convex", symbols, {"convex": self._convex_in_space(q, stiffness, tangent, pull)})
         parts = [ca.SX.sym(name, *part.shape) for name, part in zip("qctp", (q, stiffness, tangent, pull), strict=True)]
-        here, slope = self._at_points(parts[0])
+        here, slope = self.at_points(parts[0])
         total = ca.SX(self.order + 1, self.order + 1)
         for k in range(self.order + 1):
             by_turns = ca.jacobian(slope[:, k], parts[0])
@@ -350,7 +350,7 @@ class Element(Term):
     def _convex_point(self) -> ca.Function:
         """(rotation, slope, stiffness, tangent, pull) of one point -> its share of :attr:`convex`."""
         here, slope, stiffness, tangent, pull = self._point_symbols()
-        strain = self._curvature(here, slope)
+        strain = self.curvature(here, slope)
         by_both = ca.jacobian(strain, ca.vertcat(here, slope))
         now = self._tangent(here, tangent)
         across = ca.SX.eye(3) - ca.mtimes(now, now.T) / ca.dot(now, now)

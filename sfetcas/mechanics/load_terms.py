@@ -39,7 +39,6 @@ __all__ = [
     "Moment",
     "carried",
     "cut_of",
-    "elements_of",
     "followed_elements",
     "inner_cut",
     "loads_in",
@@ -92,6 +91,7 @@ class FollowingSpread(Term):
     is_load: ClassVar[bool] = True
     follows: ClassVar[bool] = True
     along_element: ClassVar[bool] = True
+    within_element: ClassVar[bool] = True
 
     nodes: int
 
@@ -274,7 +274,7 @@ def loads_in(parts: Parts) -> Iterator[One]:
         kind = FollowingSpread(space, parts.element.order + 1)
         start = parts.segments.place(parts.segments.parts[parts.segments.owner[e]].start)
         turns = tuple(rotations.turns[e].tolist())
-        yield One(kind, f"element {e}", "", parts.beams.tangent[e].ravel(), turns, (start,))
+        yield One(kind, f"element {e}", "", parts.beams.tangent[e].ravel(), turns, (start,), element=e)
 
 
 def followed_elements(scene: Scene, segments: Segments) -> list[int]:
@@ -357,7 +357,7 @@ def present(model: Any, q: Array, loading: Any) -> Any:
         width = model.element.axes if on_places else 3
         turned = quaternion.turned_by(q[group.turns], load.reshape(len(load), -1, width))
         if group.kind.along_element:
-            along[elements_of(group)] = turned
+            along[group.elements] = turned
         elif on_places:
             for part in ("force", "own"):
                 np.add.at(found[part], group.places[:, 0], turned[:, 0])
@@ -399,7 +399,7 @@ def spread_of(expressions: Any, q: ca.MX, given: Any) -> tuple[ca.MX, ca.MX]:
     for number, group in enumerate(model.terms):
         if not group.kind.along_element:
             continue
-        points = (elements_of(group)[:, None] * n + np.arange(n)).ravel()
+        points = (group.elements[:, None] * n + np.arange(n)).ravel()
         forces = ca.reshape(expressions.load(number, given), axes, len(points))
         turned = expressions.many(turned_vector(model.space), len(points))(q[:, group.turns.ravel().tolist()], forces)
         beyond = ca.DM(-model.element.to_points / model.element.weights)
@@ -409,8 +409,3 @@ def spread_of(expressions: Any, q: ca.MX, given: Any) -> tuple[ca.MX, ca.MX]:
         spread += ca.mtimes(turned, onto)
         pull += ca.mtimes(ca.mtimes(turned, ca.kron(ca.DM.eye(len(group.data)), beyond)), onto)
     return spread, pull
-
-
-def elements_of(group: Group) -> Array:
-    """Numbers (n,) of the elements that the terms of a group of distributed loads act along."""
-    return np.array([int(name.rpartition(" ")[2]) for name in group.names], dtype=np.intp)

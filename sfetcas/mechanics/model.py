@@ -32,13 +32,14 @@ from .pressure import is_pressure
 from .rotating_frame import RotatingFrame, with_rotating_frame
 from .rotations import RotationFreedom, Rotations, number_rotations
 from .segments import Segments, cut_members
+from .tendon_terms import tendons_in
 from .terms import Group, One, grouped
 from .unwrapping import Unwrapping, unwrapping_of
 
 __all__ = ["SOURCES", "Block", "Model", "assemble"]
 
 
-SOURCES: list[Callable[[Parts], Iterable[One]]] = [connections_in, touches_in, loads_in]
+SOURCES: list[Callable[[Parts], Iterable[One]]] = [connections_in, touches_in, loads_in, tendons_in]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
 
 
@@ -68,7 +69,7 @@ class Model:
     positions : Positions
         Linear maps for displacements and loop closures.
     connections : tuple of Group
-        Terms of joints, springs, small members and loads.
+        Terms of joints, springs, small members, loads and tendons.
     groups : mapping
         Loadings at factor 1, by the name of their history; None: multiplied by the load factor.
     rotating_frame : RotatingFrame or None
@@ -189,7 +190,8 @@ class Model:
         Raises
         ------
         SceneError
-            The scene has contacts or springs with stops; which of them are active only :func:`sfetcas.solve` finds.
+            The scene has contacts, springs with stops or tendons that may be slack; which of them are active only
+            :func:`sfetcas.solve` finds.
         """
         scene = self.scene
         if scene.contacts and not self.mesh.touches:
@@ -199,6 +201,10 @@ class Model:
         if stopped and not self.mesh.stops:
             message = "a model by itself knows no stops, accepted: the spring without stop, or solve(scene)"
             raise SceneError(message, ("springs", stopped[0], "stop"))
+        for name, tendon in scene.tendons.items():
+            if tendon.may_be_slack and not self.mesh.stops:
+                message = "a model by itself does not find whether a tendon is slack, accepted: pushes = true, or"
+                raise SceneError(f"{message} solve(scene)", ("tendons", name))
 
     @functools.cached_property
     def members(self) -> tuple[str, ...]:
@@ -335,7 +341,7 @@ def _blocks(model: Model) -> tuple[Block, ...]:
     if model.positions.unknowns:
         why = "nodal assembly" if model.assembly == "nodal" else "nothing but guides hold the structure"
         if model.assembly != "nodal" and model.segments.retained:
-            why = "springs, small members, slides or followers act upon places"
+            why = "springs, tendons, small members, slides or followers act upon places"
         blocks.append(Block("displacements", len(model.positions.unknowns), f"{why}: positions are unknowns"))
     if model.positions.rows:
         why = "one for each member" if model.assembly == "nodal" else "one for each loop and further held direction"

@@ -104,12 +104,12 @@ class Argument:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Least and largest accepted value: the range; else above zero for sections, from zero for ``stiffness``."""
+        """Least and largest accepted value: the range; else above zero for sections, from zero for a tension."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
         if self.name.startswith("sections.") and ".polynomial" not in self.name:
             return float(np.nextafter(0.0, 1.0)), np.inf
-        return (0.0 if self.name.endswith(".stiffness") else -np.inf), np.inf
+        return (0.0 if self.name.endswith(NOT_NEGATIVE) else -np.inf), np.inf
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -118,6 +118,9 @@ class Argument:
             return (self.name,)
         return tuple(f"{self.name}.{i}" for i in self.components)
 
+
+NOT_NEGATIVE = (".stiffness", ".tension", ".pressure", ".area")
+"""Ends of the names of numbers that are zero or above."""
 
 Asked = Sequence[str] | Mapping[str, tuple[float, float] | Parameter | None] | None
 """Names of numbers, or a mapping of them to ranges (None: no range) or :class:`Parameter`; None: defaults."""
@@ -199,11 +202,16 @@ def single_numbers(scene: Scene, values: Mapping[str, ArrayLike]) -> dict[str, f
 
 
 def default_arguments(scene: Scene) -> list[str]:
-    """Names of the default arguments: the load factor, the histories, all loads, and all prescribed motions."""
-    free = [one for table in (scene.loads, scene.motions) for one in table.values() if one.history is None]
+    """Names of the default arguments: the load factor, the histories, all loads, tendons, and prescribed motions."""
+    free = [
+        one for table in (scene.loads, scene.motions, scene.tendons) for one in table.values() if one.history is None
+    ]
     names = [FACTOR] if free or scene.gravity is not None else []
     names += [f"histories.{name}" for name in scene.histories]
     names += [f"loads.{name}.value" for name in scene.loads]
+    for name, tendon in scene.tendons.items():
+        pulls = ("tension", "pressure", "pull", "length")
+        names += [f"tendons.{name}.{key}" for key in pulls if getattr(tendon, key) is not None]
     for name, motion in scene.motions.items():
         keys = ("displacement", "rotation")
         names += [f"motions.{name}.{key}" for key in keys if getattr(motion, key) is not None]
@@ -333,6 +341,13 @@ UNITS = {
     "E": "Pa",
     "G": "Pa",
     "rho": "kg/m3",
+    "tension": "N",
+    "pull": "m",
+    "length": "m",
+    "offset": "m",
+    "ground": "m",
+    "pressure": "Pa",
+    "area": "m2",
     "factor": "1",
 }
 """Units of numbers by their keys."""
@@ -345,6 +360,8 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
     if path[0] == "springs" and len(path) > 2:
         turning = scene.springs[path[1]].type == "rotational"
         return {"stiffness": "N m" if turning else "N/m", "rest": "rad" if turning else "m"}.get(key, "m")
+    if path[0] == "tendons" and key == "stiffness":
+        return "N/m"
     if path[0] == "sections":
         if re.match(r"EI|GJ", key):
             return "N m2"
@@ -354,6 +371,7 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
 
 def _meaning(path: Sequence[str]) -> str:
     kinds = {"loads": "load", "motions": "motion", "sections": "section", "nodes": "node", "springs": "spring"}
+    kinds["tendons"] = "tendon"
     if len(path) < 2:
         return path[0]
     return f"{'.'.join(path[2:])} of the {kinds.get(path[0], path[0])} {path[1]}"

@@ -404,7 +404,7 @@ class Program:
             total += times(expressions.sizes_onto_unknowns(sides), ca.vec(sizes))
         if equations.displacement_unknowns:
             closings = len(model.positions.rows)
-            acting = times(model.positions.W.T.absolute, ca.fabs(lam[:closings]))
+            acting = times(model.positions.W.T.absolute, ca.fabs(lam[:closings, :]))
             acting += times(model.positions.Y.T.absolute, ca.fabs(found.on_places))
             acting += UNLOADED * ca.norm_inf(acting) + 1e-12
             rotation_unknowns = equations.rotation_unknowns
