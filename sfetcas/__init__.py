@@ -64,6 +64,9 @@ if TYPE_CHECKING:
     from .description.shapes import Spline as Spline
     from .description.shapes import Straight as Straight
     from .description.springs import Spring as Spring
+    from .description.tendons import Coil as Coil
+    from .description.tendons import Tendon as Tendon
+    from .description.tendons import Way as Way
     from .design.designing import Design as Design
     from .design.designing import DesignAnswer as DesignAnswer
     from .design.designing import find as find
@@ -144,6 +147,7 @@ _PUBLIC = {
     "description.sections": "CrossSection Polynomial Table",
     "description.shapes": "Arc Curvature Helix Spline Straight",
     "description.springs": "Spring",
+    "description.tendons": "Coil Tendon Way",
     "design.designing": "Design DesignAnswer find",
     "design.quasi_static": "QuasiStatic QuasiStaticAnswer",
     "dynamics.modes": "Modes",

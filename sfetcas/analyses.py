@@ -74,5 +74,4 @@ def solve(
         from .dynamics.modes import find_modes
 
         return find_modes(scene, settings)
-    stopped = any(spring.stop is not None for spring in scene.springs.values())
-    return stops.solve_stopped(scene, settings) if stopped else statics.solve(scene, settings)
+    return stops.solve_stopped(scene, settings) if scene.stopped else statics.solve(scene, settings)

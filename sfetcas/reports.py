@@ -239,6 +239,12 @@ def _report_step(step: Equilibrium, place: str, said: set[str]) -> None:
         units |= {"stop": units.get("moment", "N")}
         texts = (f"{key} {_number(value, sizes[units[key]])} {units[key]}" for key, value in found.items())
         print(f"  spring {name}: {', '.join(texts)}")
+    for name in step.model.scene.tendons:
+        state = step.tendon(name)
+        texts = (
+            f"{key} {_number(state[key], sizes[unit])} {unit}" for key, unit in (("tension", "N"), ("length", "m"))
+        )
+        print(f"  tendon {name}: {', '.join(texts)}{', slack' if state.get('slack') else ''}")
     for name in step.model.scene.motions:
         efforts = step.motion(name)
         units = {key: answer_name(f"motions.{name}.{key}").kind.unit for key in efforts}

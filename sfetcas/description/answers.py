@@ -94,7 +94,7 @@ class AnswerKind:
     @property
     def numeric(self) -> bool:
         """Whether its value consists of numbers."""
-        return self.name not in ("certificate.stable", "contacts.NAME.member")
+        return self.name not in ("certificate.stable", "contacts.NAME.member", "tendons.NAME.slack")
 
     @property
     def named(self) -> bool:
@@ -144,6 +144,9 @@ springs.NAME.moment | N m | | all | of a rotational one
 springs.NAME.travel | m | | all | of a translational one
 springs.NAME.force | N | | all | of a translational one
 springs.NAME.stop | N m, N | | statics | of one with a stop: what that adds; zero away from it
+tendons.NAME.tension | N | | all | below zero where it pushes, as a chamber
+tendons.NAME.length | m | | all | along its way
+tendons.NAME.slack | | | statics, motion | of one that does not push, with a length or stiffness
 motions.NAME.moment | N m | x y z | statics, motion, parameters | what makes a rotation; a number where that is one
 motions.NAME.force | N | x y z | statics, motion, parameters | what makes a displacement; a number at a driven joint
 magnets.NAME.energy | J | | statics, motion, parameters | minus the moment times the field, summed along members
@@ -194,6 +197,7 @@ APPLIES: dict[str, Callable[[Any, Any], bool]] = {
     "springs.NAME.travel": lambda scene, spring: spring.type == "translational",
     "springs.NAME.force": lambda scene, spring: spring.type == "translational",
     "springs.NAME.stop": lambda scene, spring: spring.stop is not None,
+    "tendons.NAME.slack": lambda scene, tendon: tendon.measured and not tendon.pushes,
     "motions.NAME.moment": lambda scene, motion: motion.rotation is not None,
     "motions.NAME.force": lambda scene, motion: motion.displacement is not None,
     "stiffness.NAME": lambda scene, node: node.support == "free",

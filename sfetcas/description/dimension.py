@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from .. import tolerances
-from ..mathematics.arrays import Array
-from ..mathematics.quaternion import rotate
+from ..mathematics.arrays import Array, values_of
+from ..mathematics.quaternion import matrix, rotate
 from .actuation import Actuation, Magnet, MagneticField
 from .contacts import Contact
 from .loads import Load, Motion
@@ -16,6 +16,7 @@ from .sections import CrossSection
 from .shapes import CenterLine
 from .springs import Spring
 from .structure import Member, Node
+from .tendons import Tendon, Way, offsets
 
 __all__ = ["out_of_plane"]
 
@@ -37,6 +38,7 @@ def out_of_plane(
     actuations: Mapping[str, Actuation],
     fields: Mapping[str, MagneticField],
     magnets: Mapping[str, Magnet],
+    tendons: Mapping[str, Tendon],
 ) -> Finding | None:
     """Place in the scene and description of the first thing that does not lie in x-y; None where all does."""
     if gravity is not None and _leaves(gravity):
@@ -56,6 +58,7 @@ def out_of_plane(
         _actuations(actuations, lines),
         _fields(fields),
         _magnets(magnets, lines),
+        _tendons(tendons, lines),
     )
     return next((finding for group in findings for finding in group), None)
 
@@ -194,6 +197,25 @@ def _magnets(magnets: Mapping[str, Magnet], lines: Mapping[str, CenterLine]) -> 
         start = lines[magnet.member].quaternions(np.zeros(1))
         if _leaves(rotate(start, np.asarray(magnet.vector))[0]):
             yield ("magnets", name, "moment_density"), "leaves x-y"
+
+
+def _tendons(tendons: Mapping[str, Tendon], lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
+    for name, tendon in tendons.items():
+        for i, way in enumerate(tendon.way):
+            if any(_leaves(arm) for arm in _arms(way, lines)):
+                yield ("tendons", name, "way", str(i)), "leaves x-y"
+
+
+def _arms(way: Way, lines: Mapping[str, CenterLine]) -> Iterator[Triple | Array]:
+    """Points of the ground, or arms along the way, in the fixed axes."""
+    if way.ground is not None:
+        yield way.ground
+    elif way.node is not None:
+        yield np.array([*map(float, way.offset or ()), 0.0, 0.0, 0.0])[:3]  # type: ignore[arg-type]
+    elif way.member is not None:
+        x = np.linspace(*way.ends, 9) if not way.holes else np.array(way.holes)
+        frames, across = matrix(lines[way.member].quaternions(x)), values_of(offsets(way, x, x)[0])
+        yield from np.einsum("nij,nj->ni", frames[:, :, 1:], across)
 
 
 def _leaves(vector: Triple | Array) -> bool:

@@ -33,6 +33,7 @@ from .springs import Spring
 from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
 from .task import Analysis, Expect, Until
+from .tendons import Tendon, Way, check_tendon
 
 __all__ = [
     "Actuation",
@@ -48,7 +49,9 @@ __all__ = [
     "Node",
     "Scene",
     "Spring",
+    "Tendon",
     "Until",
+    "Way",
     "check_loaded",
     "check_scene",
 ]
@@ -82,6 +85,8 @@ class Scene(Record):
         ``[members.NAME]``: at least one.
     springs : table by name
         ``[springs.NAME]``: springs, dampers and stops.
+    tendons : table by name
+        ``[tendons.NAME]``: tendons that pull along their ways, and chambers that push.
     loads : table by name
         ``[loads.NAME]``: forces, moments and distributed loads.
     motions : table by name
@@ -128,6 +133,7 @@ class Scene(Record):
     nodes: Named[Node] = Field(default_factory=dict)
     members: Named[Member] = Field(default_factory=dict)
     springs: Named[Spring] = Field(default_factory=dict)
+    tendons: Named[Tendon] = Field(default_factory=dict)
     loads: Named[Load] = Field(default_factory=dict)
     motions: Named[Motion] = Field(default_factory=dict)
     histories: Named[History] = Field(default_factory=dict)
@@ -239,6 +245,12 @@ class Scene(Record):
         """Whether nodes have ``start`` places, which choose among equilibria."""
         return any(node.start is not None for node in self.nodes.values())
 
+    @property
+    def stopped(self) -> bool:
+        """Whether springs have stops or tendons may be slack, so that it has to be found which of them act."""
+        springs = any(spring.stop is not None for spring in self.springs.values())
+        return springs or any(tendon.may_be_slack for tendon in self.tendons.values())
+
     @cached_property
     def size(self) -> float:
         """Diagonal of the bounding box of the undeformed members, m."""
@@ -287,6 +299,7 @@ class Scene(Record):
             self.actuations,
             self.fields,
             self.magnets,
+            self.tendons,
         )
 
     @property
@@ -302,7 +315,7 @@ class Scene(Record):
         return {record.history for _, _, record in self.driven if record.history is not None}
 
 
-DRIVEN = ("loads", "motions", "actuations", "fields")
+DRIVEN = ("loads", "tendons", "motions", "actuations", "fields")
 """Tables of what grows with the load factor, or with a history."""
 
 _TABLES = {
@@ -310,6 +323,7 @@ _TABLES = {
     "nodes": ("node",),
     "members": ("member",),
     "springs": ("spring",),
+    "tendons": ("tendon",),
     "loads": ("load",),
     "motions": ("prescribed motion",),
     "histories": ("history", "histories"),
@@ -368,14 +382,16 @@ def check_loaded(scene: Scene) -> None:
     Raises
     ------
     SceneError
-        There are no loads, prescribed motions, gravity, rotation of the axes or preloaded springs.
+        There are no loads, prescribed motions, tendons, gravity, rotation of the axes or preloaded springs.
     """
     if scene.analysis.type in ("modes", "dynamic"):
         return
     pressed = any(spring.rest or spring.length is not None for spring in scene.springs.values())
     everywhere = scene.gravity is not None or scene.rotating is not None
     if not any(scene.driven) and not everywhere and not pressed:
-        raise SceneError("scene without load: statics needs at least one load, one motion, gravity or turning axes")
+        raise SceneError(
+            "scene without load: statics needs at least one load, one motion, one tendon, gravity or turning axes"
+        )
 
 
 def _check_driven(scene: Scene) -> None:
@@ -394,6 +410,21 @@ def _check_driven(scene: Scene) -> None:
     for name, magnet in scene.magnets.items():
         _known(magnet.member, scene.members, "members", "magnets", name, "member")
         _known(magnet.node, scene.nodes, "nodes", "magnets", name, "node")
+
+
+def _check_tendons(scene: Scene) -> None:
+    for name, tendon in scene.tendons.items():
+        _known(tendon.history, scene.histories, "histories", "tendons", name, "history")
+        try:
+            check_tendon(tendon, scene.nodes, scene.members, scene.center_lines)
+        except SceneError as error:
+            raise error.within("tendons", name) from None
+        if scene.contacts:
+            raise SceneError("found with contacts, accepted: without tendons", ("contacts",))
+        if tendon.may_be_slack and (scene.analysis.type != "static" or scene.analysis.equilibria == "all"):
+            what = "'all' equilibria" if scene.analysis.type == "static" else f"the analysis {scene.analysis.type!r}"
+            message = f"found a length that is given with {what}, in which no tendon becomes slack, accepted: pushes ="
+            raise SceneError(f"{message} true, with which it is kept as long, or a stiffness", ("tendons", name))
 
 
 def _known(word: str | None, table: Iterable[str], kind: str, *where: str) -> None:
@@ -746,6 +777,7 @@ def check_scene(value: object, call: str) -> None:
 _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_members,
     _check_lengths,
+    _check_tendons,
     _check_driven,
     _check_axes,
     _check_dimension,

@@ -51,8 +51,7 @@ def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
     # What acts later only, or is cut, may be all that makes a scene one in space.
     tables |= {"dimension": scene.resolved_dimension, "analysis": analysis, "expect": ()}
     before = Scene(**{**_given_keys(scene), **tables})
-    stopped = any(spring.stop is not None for spring in scene.springs.values())
-    return (stops.solve_stopped(before, settings) if stopped else statics.solve(before, settings)).last
+    return (stops.solve_stopped(before, settings) if scene.stopped else statics.solve(before, settings)).last
 
 
 DRIVEN = ("value", "displacement", "rotation")

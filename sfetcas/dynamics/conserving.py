@@ -110,7 +110,7 @@ class _Middle:
         forces = system.forces(moved / h, 2.0 * (moved / h - begin.rates) / h)
         c, b = 1.0 / h, 2.0 / h**2
         linear, tables = forces[: system.linear], system.tables
-        gaps, rows = system.open_gaps(y, end), []
+        gaps, rows = system.open_gaps(y, end), list[tuple[int, ca.MX]]()
         entries, full, coupled = [], [], []
         for number, (group, sides) in enumerate(zip(model.terms, tables.sides, strict=True)):
             count, element = len(group.data), number == 0
@@ -132,8 +132,8 @@ class _Middle:
                 entries += [picked(ca.vec(part), chosen) * signs for part in (rotation_jacobian, mean)]
                 massive = system.massive_columns
                 coupled += self._inner(system, mean[:, massive], rotation_jacobian[:, massive], c, b)
-            elif group.rows:
-                rows.append(ca.vec(values))
+            elif group.labels.size:
+                rows.append((number, ca.vec(values)))
                 entries += [ca.vec(rotation_jacobian), ca.vec(mean)]
         observed = []
         for seen, sides, (first, last) in zip(system.masses.observables, system.observed, system.ranges, strict=True):
@@ -150,7 +150,7 @@ class _Middle:
                 ca.vec(system.paired(width, mean.shape[1] // count, count)(mean, rotation_jacobian, weight))
             )
         on_places = times(system.by_place.T, linear) - middle.force
-        self.residual = system.gathered(full, on_places, lam[:n, :], [gaps, *rows])
+        self.residual = system.gathered(full, on_places, lam[:n, :], [gaps, system.stacked(rows)])
         places_of = [b * system.place_mass.nz[:], c * system.place_drag.nz[:]]
         self.entries = [*entries, ca.MX(1), *observed, *coupled, *places_of]
 

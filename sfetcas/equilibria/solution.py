@@ -196,6 +196,10 @@ class Configuration:
         """State of a spring: angle (rad) and moment (N m) on its second party, or travel (m) and force (N)."""
         return self.fields.spring(self._known(name, tuple(self.model.scene.springs), "spring"))
 
+    def tendon(self, name: str) -> dict[str, Any]:
+        """State of a tendon: ``tension`` (N), ``length`` (m), and ``slack`` where it may be."""
+        return dict(self.fields.tendon(self._known(name, tuple(self.model.scene.tendons), "tendon")))
+
     def motion(self, name: str) -> dict[str, Any]:
         """What enforces a prescribed motion: ``moment`` (N m) or ``force`` (N), see :meth:`.Fields.drive`."""
         return self.fields.drive(self._known(name, tuple(self.model.scene.motions), "motion"))
@@ -265,9 +269,8 @@ class Configuration:
         Parameters
         ----------
         kind : str
-            A table of the answer: ``nodes``, ``reactions``, ``members``, ``springs``, ``motions``, ``magnets`` or
-            ``contacts``;
-            empty for the quantities of the whole state.
+            A table of the answer: ``nodes``, ``reactions``, ``members``, ``springs``, ``tendons``, ``motions``,
+            ``magnets`` or ``contacts``; empty for the quantities of the whole state.
         name : str
             Name of the record.  Of a member only integral and largest values; :meth:`along` has its fields.
 
@@ -282,6 +285,7 @@ class Configuration:
             "reactions": lambda: dict(zip(("force", "moment"), self.reaction(name), strict=True)),
             "members": lambda: self._member(name),
             "springs": lambda: dict(self.spring(name).to_dict()),
+            "tendons": lambda: self.tendon(name),
             "motions": lambda: self.motion(name),
             "magnets": lambda: self.magnet(name),
             "contacts": lambda: self.contacts.get(name, {}),
@@ -383,7 +387,7 @@ class Equilibrium(Configuration):
 
     def to_dict(self) -> dict[str, Any]:
         """The equilibrium as an entry of ``steps`` in the JSON answer."""
-        tables = self.tables("nodes", "reactions", "members", "springs", "motions", "magnets", "contacts")
+        tables = self.tables("nodes", "reactions", "members", "springs", "tendons", "motions", "magnets", "contacts")
         for name, found in tables["members"].items():
             places = self.places(name)
             tables["members"][name] = {"s": places, **self.along(name, places), **found}

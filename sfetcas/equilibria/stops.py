@@ -1,8 +1,11 @@
-"""Statics where springs may be held at their stops, by an active-set method.
+"""Statics where springs may be held at their stops and tendons may be slack, by an active-set method.
 
 Each load factor is solved by itself.  Of the active stops whose reaction has the wrong sign the worst is released;
 where there is none, of the stops that are violated the worst is activated; until no reaction has the wrong sign and no
 stop is violated.  An active stop is a constraint, and its multiplier is the reaction of the stop.
+
+A tendon of given length is such a constraint too: its multiplier is its tension.  It begins as taut, of those that
+would push the one that pushes most becomes slack, and a slack one that is longer than its free length is taut again.
 """
 
 from __future__ import annotations
@@ -20,13 +23,13 @@ from .statics import Settings, solve
 __all__ = ["solve_stopped"]
 
 Stops = tuple[tuple[str, str], ...]
-"""Springs that stand at a stop: name, and low or high."""
+"""Springs that stand at a stop: name, and low or high; tendons that are slack: name, and slack."""
 
 T = TypeVar("T")
 
 
 def solve_stopped(scene: Scene, settings: Settings) -> Solution:
-    """Equilibria of a scene whose springs have stops.
+    """Equilibria of a scene whose springs have stops, or whose tendons may be slack.
 
     Raises
     ------
@@ -63,17 +66,23 @@ def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops) -> 
         if change == stops:
             return found, stops
         stops = change
-    names = ", ".join(f"springs.{name}" for name, _ in stops)
-    raise SolveError(Status.FAILED, f"no choice of stops holds: {names}")
+    names = ", ".join(f"{'tendons' if side == 'slack' else 'springs'}.{name}" for name, side in stops)
+    raise SolveError(Status.FAILED, f"no choice of stops and slack tendons holds: {names}")
 
 
 def _next_stops(answer: Equilibrium, stops: Stops) -> Stops:
-    """The stops without the one that pulls most or, where none does, with the one that is passed most."""
-    scene, known = answer.model.scene, dict(stops)
-    pulls = {name: _pull(answer.spring(name).stop or 0.0, side) for name, side in stops}
+    """The stops without the one that pulls most or, where none does, with the one that is passed most.
+
+    Tendons come first: without the slack one that is longest beyond its free length, or with the one that pushes most.
+    """
+    scene, known = answer.model.scene, dict(stop for stop in stops if stop[1] != "slack")
+    changed = _next_slack(answer, stops)
+    if changed != stops:
+        return changed
+    pulls = {name: _pull(answer.spring(name).stop or 0.0, side) for name, side in stops if side != "slack"}
     if pulls and max(pulls.values()) > 0.0:
         worst = _first_of_most(pulls)
-        return tuple(stop for stop in stops if stop[0] != worst)
+        return tuple(stop for stop in stops if stop[0] != worst or stop[1] == "slack")
     passed: dict[tuple[str, str], float] = {}
     for name, spring in scene.springs.items():
         if spring.stop is not None and name not in known:
@@ -82,6 +91,26 @@ def _next_stops(answer: Equilibrium, stops: Stops) -> Stops:
     if passed and max(passed.values()) > 0.0:
         return (*stops, _first_of_most(passed))
     return stops
+
+
+def _next_slack(answer: Equilibrium, stops: Stops) -> Stops:
+    """The stops with the tendon that pushes most, or without the slack one that is longest beyond its free length."""
+    tendons = {name: tendon for name, tendon in answer.model.scene.tendons.items() if tendon.may_be_slack}
+    if not tendons:
+        return stops
+    slack = {name for name, side in stops if side == "slack"}
+    pushing = {name: -answer.tendon(name)["tension"] for name in tendons if name not in slack}
+    if pushing and max(pushing.values()) > ROUNDING * answer.model.scales.force:
+        return (*stops, (_first_of_most(pushing), "slack"))
+    beyond = {name: answer.fields.beyond(name) for name in tendons if name in slack}
+    if beyond and max(beyond.values()) > ROUNDING * answer.model.scales.length:
+        worst = _first_of_most(beyond)
+        return tuple(stop for stop in stops if stop != (worst, "slack"))
+    return stops
+
+
+ROUNDING = 1e-12
+"""Of tensions and lengths over the units of the model: a tendon that has next to nothing to do stays as it is."""
 
 
 def _first_of_most(found: dict[T, float]) -> T:

@@ -124,4 +124,12 @@ def actuations_in(parts: Parts) -> Iterator[One]:
             number = first + e
             data = np.concatenate([parts.beams.stiffness[number].ravel(), numbers([parts.beams.weight[number].sum()])])
             sides = tuple(parts.rotations.turns[number].tolist())
-            yield One(NaturalCurvature(element.space, element), f"element {number}", "", data, sides, loads=loads)
+            yield One(
+                NaturalCurvature(element.space, element),
+                f"element {number}",
+                "",
+                data,
+                sides,
+                loads=loads,
+                element=number,
+            )

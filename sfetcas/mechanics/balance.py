@@ -16,8 +16,8 @@ from ..mathematics.keeping import kept
 from .batches import GroupBatch
 from .connections import connections_of
 from .equations import Equations, State
-from .load_terms import elements_of
 from .loading import Loading
+from .segments import elongation_of
 from .terms import answers_of
 
 __all__ = ["Balance", "SpringState", "three"]
@@ -110,14 +110,44 @@ class Balance:
         return self._reactions.fixed_directions(number) @ moment
 
     def starting_moments(self, elements: slice) -> Array:
-        """Moments (n, 3) that the surroundings exert on the first nodes of elements."""
-        found = self._shares[0][elements, : self._turns].copy()
+        """Moments (n, 3) that the surroundings exert on the first nodes of elements and what runs along them."""
+        return self._three(self._on_elements[elements])
+
+    @functools.cached_property
+    def _on_elements(self) -> Array:
+        """Moments (elements, turns) that elements and what runs along them take from their first nodes."""
+        found = self._shares[0][:, : self._turns].copy()
         for group, share in zip(self.model.terms, self._shares, strict=True):
             if group.kind.along_element:
-                number = elements_of(group) - elements.start
-                inside = (number >= 0) & (number < len(found))
-                np.add.at(found, number[inside], share[inside, : self._turns])
-        return self._three(found)
+                np.add.at(found, group.elements, share[:, : self._turns])
+        return found
+
+    def jumps(self, elements: slice) -> Array:
+        """Moments (n, 3) that tendons exert on a member where its elements begin, but on the first."""
+        found = np.zeros((len(self._shares[0]), self._turns))
+        for number, i, side, element in self._reactions.jumping:
+            found[element] -= self._shares[number][i, side * self._turns : (side + 1) * self._turns]
+        return self._three(found[elements])
+
+    def tendon(self, name: str) -> dict[str, float]:
+        """Tension, N, and length, m, of a tendon."""
+        found, scales = {"tension": 0.0, "length": 0.0}, self.model.scales
+        for number, group in enumerate(self.model.connections):
+            if group.kind.table == "tendons" and name in group.names:
+                own = self._answers(number)[[each == name for each in group.names]]
+                found["tension"] = float(own[0, 0]) * scales.force
+                found["length"] += float(own[:, 1].sum()) * scales.length
+        return found
+
+    def rest_length(self, name: str) -> float:
+        """Length of a tendon in the undeformed scene, m."""
+        groups = [group for group in self.model.connections if group.kind.table == "tendons"]
+        own = [group.data[[each == name for each in group.names], -2:].sum() for group in groups]
+        return float(sum(own)) * self.model.scales.length
+
+    def elongation(self, name: str) -> float:
+        """Of an elastic tendon, dimensionless."""
+        return float(self._places[self.model.segments.place(elongation_of(name)), 0])
 
     def start_moment(self, member: str) -> Array:
         """Moment (3,) that the surroundings exert on the first end of a flexible or rigid member."""
@@ -162,9 +192,8 @@ class Balance:
     def _answers(self, number: int) -> Array:
         """What all connections of a group tell, (n, answers), dimensionless."""
         model, state, group = self.model, self._state, self.model.connections[number]
-        first = len(model.positions.rows) + sum(len(other.rows) for other in model.connections[:number])
         batch = GroupBatch(model, group, answers_of(group.kind), model.unwrapping.parts[number + 1])
-        lam = state.lam[first : first + len(group.rows)]
+        lam = state.lam[len(model.positions.rows) + group.labels.ravel()]
         return batch(state.q, self._places, state.unwrapped, self._loading.loads[number], lam)[0]
 
     def body_ends(self, member: str) -> list[tuple[Array, Array]]:

@@ -13,7 +13,7 @@ from ..mathematics.arrays import Array
 from .elements import Element
 from .mesh import Mesh
 
-__all__ = ["ELEMENT_DATA", "Beams", "Scales", "beams_of", "load_size", "scales_of"]
+__all__ = ["ELEMENT_DATA", "Beams", "Scales", "beams_of", "in_fixed_axes", "load_size", "scales_of"]
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,7 @@ def scales_of(scene: Scene) -> Scales:
             found.append(float(turning) * scene.center_lines[name].length / length)
     found = found or [spring.stiffness for spring in scene.springs.values() if spring.type == "rotational"]
     found = found or [spring.stiffness * length**2 for spring in scene.springs.values()]
+    found = found or [tendon.stiffness * length**2 for tendon in scene.tendons.values() if tendon.stiffness is not None]
     return Scales(length, max(found, default=0.0) or load_size(scene, length) or 1.0)
 
 
@@ -97,6 +98,7 @@ def load_size(scene: Scene, length: float) -> float:
         strength * math.hypot(*magnet.vector) * (1.0 if magnet.member is None else length)
         for magnet in scene.magnets.values()
     ]
+    forces += [abs(tendon.force) for tendon in scene.tendons.values() if not tendon.measured]
     masses = [node.mass for node in scene.nodes.values()]
     for name, member in scene.members.items():
         if member.section is not None:
@@ -129,7 +131,7 @@ def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beam
         frames = quaternion.matrix(line.quaternions(x.ravel()))
         # Integrals over xi of squares of derivatives by xi: weight over length.
         per_length = (element.weights / length[:, None])[..., None]
-        stiffness.append(_in_fixed_axes(values, frames, element, line.bending_axis).reshape(*x.shape, -1) * per_length)
+        stiffness.append(in_fixed_axes(values, frames, element, line.bending_axis).reshape(*x.shape, -1) * per_length)
         tangent.append(frames[:, : element.axes, 0].reshape(*x.shape, -1) * w[..., None])
         weight.append(w)
         compliance.append(np.zeros((*x.shape, size)))
@@ -155,7 +157,7 @@ def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beam
     )
 
 
-def _in_fixed_axes(values: Array, frames: Array, element: Element, bending_axis: int) -> Array:
+def in_fixed_axes(values: Array, frames: Array, element: Element, bending_axis: int) -> Array:
     """Stiffness (n, 3) or (n, 3, 3) about b1, b2, b3 in the fixed axes: upper triangles (n, 6), or about z (n, 1)."""
     if not element.space:
         return values[:, 1:2] if bending_axis == 2 else values[:, 2:3]

@@ -165,6 +165,8 @@ class _Maker:
     def stops(self, mesh: Mesh) -> Iterator[One]:
         """Springs that stand at a stop."""
         for name, side in mesh.stops:
+            if side == "slack":
+                continue
             spring, row = self.scene.springs[name], f"springs.{name}.stop"
             assert spring.stop is not None
             at = spring.stop[0 if side == "low" else 1]

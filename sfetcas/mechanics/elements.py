@@ -114,7 +114,7 @@ class Element(Term):
         """Strain energy, plus the potential of the loads by their pulls."""
         stiffness, tangent, _ = self.split(data)
         pull, now = ca.reshape(load, self.axes, self.order + 1), self.tangents(q, u, data)
-        here, slope = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
+        here, slope = self.at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
         energy = ca.SX(0)
         for k in range(self.order + 1):
             energy += self._strain_energy(here[:, k], slope[:, k], stiffness[:, k])
@@ -131,7 +131,7 @@ class Element(Term):
     def tangents(self, q: list[Side], u: list[Side], data: ca.SX) -> list[ca.SX]:
         """Turned and strained tangents of the points, for data of which the last are those of :attr:`line_data`."""
         tangent, compliance = self.line(data[-self.line_data :])
-        here = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))[0]
+        here = self.at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))[0]
         strains = [ca.vertcat(*side) for side in u]
         found = []
         for k in range(self.order + 1):
@@ -161,13 +161,13 @@ class Element(Term):
         )
         return stiffness, tangent, compliance
 
-    def _at_points(self, q: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def at_points(self, q: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Rotation and its derivative by xi at the integration points."""
         slope = ca.mtimes(q, ca.DM(interpolation.differentiation(self.nodes, self.points).T))
         here = ca.mtimes(q, ca.DM(interpolation.evaluation(self.nodes, self.points).T)) if self.gauss else q
         return here, slope
 
-    def _curvature(self, here: ca.SX, slope: ca.SX) -> ca.SX:
+    def curvature(self, here: ca.SX, slope: ca.SX) -> ca.SX:
         """Change of the curvature times length at one point in space, about the fixed axes of the undeformed scene."""
         q = ca.vertsplit(here)
         k = 2.0 * ca.vertcat(*product([q[0], -q[1], -q[2], -q[3]], ca.vertsplit(slope))[1:])
@@ -175,9 +175,9 @@ class Element(Term):
 
     def changes(self, q: list[Side]) -> list[ca.SX]:
         """Change of the curvature times length (turns,) at each point, about the fixed axes; in the plane about z."""
-        here, slope = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
+        here, slope = self.at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
         points = range(self.order + 1)
-        return [self._curvature(here[:, k], slope[:, k]) if self.space else slope[:, k] for k in points]
+        return [self.curvature(here[:, k], slope[:, k]) if self.space else slope[:, k] for k in points]
 
     def section(self, stiffness: ca.SX) -> ca.SX:
         """Stiffness of one point as a matrix (turns, turns)."""
@@ -294,7 +294,7 @@ class Element(Term):
         n = self.order + 1
         shapes = {"q": (self.components, n), "c": (1, n), "t": (self.axes, n), "p": (self.axes, n)}
         parts = [ca.SX.sym(name, *shape) for name, shape in shapes.items()]
-        here, slope = self._at_points(parts[0])
+        here, slope = self.at_points(parts[0])
         total = ca.SX(n, n)
         for k in range(n):
             by_turns = ca.jacobian(slope[:, k], parts[0])
@@ -466,7 +466,7 @@ class Element(Term):
         """(rotation, slope, stiffness, tangent, pull) of one point -> its share of :attr:`convex`."""
         sizes = {"here": 4, "slope": 4, "stiffness": 6, "tangent": 3, "pull": 3}
         here, slope, stiffness, tangent, pull = (ca.SX.sym(name, size) for name, size in sizes.items())
-        strain = self._curvature(here, slope)
+        strain = self.curvature(here, slope)
         by_both = ca.jacobian(strain, ca.vertcat(here, slope))
         now = self._tangent(here, tangent)
         across = ca.SX.eye(3) - ca.mtimes(now, now.T) / ca.dot(now, now)

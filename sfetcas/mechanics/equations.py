@@ -327,7 +327,10 @@ class Equations:
             scale[displacement] += sums + UNLOADED * sums.max(initial=0.0) + 1e-12
         if self.rows:
             gap = self._gaps(self._chords(found[0][2]), state, loading)
-            residual[self.unknowns :] = np.concatenate([gap, *(part[2].ravel() for part in found[1:])])
+            residual[self.unknowns : self.unknowns + len(gap)] = gap
+            for group, part in zip(self._terms[1:], found[1:], strict=True):
+                # Several terms may share a row.
+                np.add.at(residual, self.unknowns + group.rows, part[2].ravel())
         if len(self._retained):
             # A component along which nothing acts is judged by what acts across it.
             scale[self._retained] = scale[self._retained].max(axis=1, keepdims=True)
@@ -560,7 +563,7 @@ class _Terms:
         self._closed = tables.closed if number == 0 else None
         labels, n = tables.labels[number] - tables.of_rows, len(group.data)
         # Elements have their multipliers from those of the loop closures.
-        self._rows = slice(int(labels[0, 0]), int(labels[-1, -1]) + 1) if labels.size else slice(0, 0)
+        self.rows = labels.ravel()
         function = chosen(rotation_gradient(group.kind), evaluations * n, kernels)
         self._batch = GroupBatch(model, group, function, model.unwrapping.parts[number])
 
@@ -575,7 +578,7 @@ class _Terms:
 
         ``places`` are the displacements (places, axes), ``constant`` the multipliers of elements.
         """
-        lam = constant if self._closed is not None else state.lam[self._rows]
+        lam = constant if self._closed is not None else state.lam[self.rows]
         return self._batch(state.q, places, state.unwrapped, load, lam)
 
     def entries(self, found: list[Array], *, convex: bool = False) -> Array:
@@ -583,7 +586,7 @@ class _Terms:
         stiffness, rotation_jacobian = found[4], found[5]
         if convex and not self.kind.has_potential:
             stiffness = np.zeros_like(stiffness)
-        elif convex and not self.group.rows:
+        elif convex and not self.group.labels.size:
             width = self.sides.shape[1]
             stiffness = _positive_part(stiffness.reshape(-1, width, width))
         closed = self._closed

@@ -173,16 +173,16 @@ class SymbolicTerms:
 
     def gaps_of(self, arguments: list[list[ca.MX]], y: ca.MX, given: Given) -> ca.MX:
         """As :meth:`gaps`, from the arguments that :meth:`every` gives."""
-        closed, rows = self.open_gaps(y, given), []
+        closed, rows = self.open_gaps(y, given), list[tuple[int, ca.MX]]()
         for number, (group, own) in enumerate(zip(self.model.terms, arguments, strict=True)):
-            if not len(group.data) or not (group.rows if number else self.model.positions.rows):
+            if not len(group.data) or not (group.labels.size if number else self.model.positions.rows):
                 continue
             found = ca.vec(self.many(rows_of(group.kind), len(group.data))(*own))
             if number == 0:
                 closed += times(self.closing, found)
             else:
-                rows.append(found)
-        return ca.vertcat(closed, *rows)
+                rows.append((number, found))
+        return ca.vertcat(closed, self.stacked(rows))
 
     def with_prescribed_rotations(self, q: ca.MX, given: Given) -> ca.MX:
         """The rotations with prescribed ones set to their values."""
@@ -232,9 +232,19 @@ class SymbolicTerms:
         group = self.model.terms[number]
         if number == 0:
             return ca.reshape(times(self.closing.T, lam[: self.closing.shape[0], :]), self.axes, self.elements)
-        labels = self.tables.labels[number] - self.tables.of_rows
-        first = int(labels[0, 0]) if labels.size else 0
-        return ca.reshape(lam[first : first + labels.size, :], group.kind.sizes[2], len(group.data))
+        labels = self.tables.labels[number].ravel() - self.tables.of_rows
+        first = int(labels[0]) if labels.size else 0
+        own = lam[labels.tolist(), :] if group.shared else lam[first : first + labels.size, :]
+        return ca.reshape(own, group.kind.sizes[2], len(group.data))
+
+    def stacked(self, rows: list[tuple[int, ca.MX]]) -> ca.MX:
+        """Rows beside the loop closures from those of groups of terms, by their numbers; shared ones are added up."""
+        if not any(self.model.terms[number].shared for number, _ in rows):
+            return ca.vertcat(ca.MX(0, 1), *(values for _, values in rows))
+        first = len(self.model.positions.rows)
+        labels = np.concatenate([self.tables.labels[n].ravel() - self.tables.of_rows - first for n, _ in rows])
+        adder = sparse(labels, np.arange(len(labels)), np.ones(len(labels)), (self.tables.rows - first, len(labels)))
+        return times(adder, ca.vertcat(*(values for _, values in rows)))
 
     def arguments(self, number: int, q: ca.MX, places: ca.MX, given: Given, unwrapped: ca.MX) -> list[ca.MX]:
         """Rotations, displacements, data and loads of the terms of a group, as their functions take them."""

@@ -20,12 +20,12 @@ from .balance import Balance, SpringState
 from .balance import three as _three
 from .batches import GroupBatch
 from .equations import Equations, State, scaled_strains, turned_points, turned_tangents
-from .load_terms import elements_of
 from .loading import Loading
 from .magnetism import magnet_terms
 from .mesh import Touch
 from .singles import fibre_strain
 from .stations import Stations
+from .tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
 from .terms import answers_of, energies_of
 
 __all__ = ["Fields", "rotations_along", "strained_like", "transferred"]
@@ -176,7 +176,7 @@ class Fields:
         found = np.zeros((part.stop - part.start, len(model.element.points), 3))
         for group, load in zip(model.connections, self._loading.loads, strict=True):
             if group.kind.table == "actuations":
-                number = elements_of(group) - part.start
+                number = group.elements - part.start
                 own = (number >= 0) & (number < len(found))
                 values = load[own].reshape(-1, found.shape[1], model.element.turns)
                 found[number[own], :, 3 - model.element.turns :] = values
@@ -226,7 +226,7 @@ class Fields:
             load = self._loading.loads[number - 1] if number else None
             batch = GroupBatch(self.model, group, energies_of(group.kind))
             energies = batch(self.q, self._nodal, self.state.unwrapped, load)[1].ravel()
-            found[elements_of(group) if number else slice(None)] += energies
+            found[group.elements if number else slice(None)] += energies
         return found
 
     def magnet(self, name: str) -> dict[str, Any]:
@@ -251,10 +251,53 @@ class Fields:
         # m' = -r' x n; the pull at the points is minus the force there.
         moment = _summed(at, moments, self._gained(part, pull))
         rotation = rotations_along(model, self.state.q, member, x)
+        if stretches_of(model.scene, member):
+            about, along = self._strung(member, x, rotation, moment)
+            moment, force = moment - about, force - along
         for touch in model.mesh.touches if pressed else ():
             if touch.member == member and touch.to is not None:
                 self._lay(touch, x, rotation, force, moment)
         return {"position": position, "rotation": rotation, "force": force, "moment": moment}
+
+    def _strung(self, member: str, x: Array, rotation: Array, moment: Array) -> tuple[Array, Array]:
+        """Moment and force (n, 3) that tendons along a member carry at its sections, dimensionless."""
+        model, at, turns = self.model, self._stations(member, x), self.model.element.turns
+        part, force = model.elements_of(member), model.scales.force
+        names = [name for name, _ in stretches_of(model.scene, member)]
+        tensions = [self.balance.tendon(name)["tension"] / force for name in names]
+        nodal = self.q[model.rotations.turns[part]][at.elements]
+        lengths = model.beams.weight[part].sum(axis=1)[at.elements]
+        slope = np.einsum("nj,njc->nc", at.slopes, nodal) / lengths[:, None]
+        guess, body = slope, moment[:, 2:]
+        if model.space:
+            guess = 2.0 * quaternion.multiply(quaternion.conjugate(rotation), slope)[:, 1:]
+            body = quaternion.rotate(quaternion.conjugate(rotation), moment)
+        # What is rigid is not bent.
+        steps = NEWTON_STEPS if model.scene.members[member].type == "flexible" else 0
+        function = share_of(model.space, len(names), steps).map(len(x))
+        data = section_data(model, member, x, model.scales)
+        found = function(body[:, -turns:].T, guess.T, data.T, np.tile(tensions, (len(x), 1)).T)
+        about, along = (part.full().T for part in found)
+        if model.space:
+            return quaternion.rotate(rotation, about), quaternion.rotate(rotation, along)
+        about = np.pad(about, ((0, 0), (2, 0)))
+        return about, _three(quaternion.turned_by(rotation[:, None, :], along[:, None, :])[:, 0])
+
+    def tendon(self, name: str) -> dict[str, float | bool]:
+        """Tension, N, and length, m, of a tendon, and of one that does not push whether it is slack."""
+        found: dict[str, float | bool] = {**self.balance.tendon(name)}
+        tendon = self.model.scene.tendons[name]
+        if not tendon.measured or tendon.pushes:
+            return found
+        slack = (name, "slack") in self.model.mesh.stops
+        return {**found, "slack": slack if tendon.stiffness is None else self.balance.elongation(name) <= 0.0}
+
+    def beyond(self, name: str) -> float:
+        """How much longer than its free length at this load factor a tendon of given length is, m."""
+        tendon, rest = self.model.scene.tendons[name], self.balance.rest_length(name)
+        pull = (tendon.pull or 0.0) if tendon.length is None else rest - tendon.length
+        factor = self.model.factors(self._applied.factor)[tendon.history]
+        return float(self.balance.tendon(name)["length"] - rest + factor * pull)
 
     def _lay(self, touch: Touch, x: Array, rotation: Array, force: Array, moment: Array) -> None:
         """Force and moment along a stretch that lies on an obstacle, in place, dimensionless.
@@ -594,6 +637,7 @@ class Fields:
         part = model.elements_of(member)
         gains = self._gained(part, self._pull[part]).sum(axis=1)
         chain = model.rotations.turns[part]
+        gains[:-1] -= self.balance.jumps(part)[1:]
         # A couple at a cut is a jump of the moment.
         if model.scene.members[member].type == "rigid":
             gains[:-1] -= self._loading.jump[part][1:]

@@ -39,7 +39,6 @@ __all__ = [
     "Moment",
     "carried",
     "cut_of",
-    "elements_of",
     "followed_elements",
     "inner_cut",
     "loads_in",
@@ -286,7 +285,7 @@ def loads_in(parts: Parts) -> Iterator[One]:
         kind = FollowingSpread(space, parts.element)
         start = parts.segments.place(parts.segments.parts[parts.segments.owner[e]].start)
         sides = tuple(rotations.turns[e].tolist()), (start, *parts.segments.strains[e].tolist())
-        yield One(kind, f"element {e}", "", line[e], *sides)
+        yield One(kind, f"element {e}", "", line[e], *sides, element=e)
 
 
 def followed_elements(parts: Parts) -> list[int]:
@@ -373,7 +372,7 @@ def present(model: Any, q: Array, places: Array, loading: Any) -> Any:
             for k, values in enumerate((q[group.turns], places[group.places], group.data, load)):
                 batch.set(k, values)
             forces, couples = batch()
-            number = elements_of(group)
+            number = group.elements
             np.add.at(along, number, forces.reshape(len(number), *along.shape[1:]))
             np.add.at(found["torque"], number, couples.reshape(len(number), *loading.torque.shape[1:]))
             loads[i] = np.zeros_like(load)
@@ -437,7 +436,7 @@ def spread_of(expressions: Any, q: ca.MX, y: ca.MX, given: Any) -> tuple[ca.MX, 
     for number, group in enumerate(model.terms):
         if not _has_densities(group.kind):
             continue
-        points = (elements_of(group)[:, None] * n + np.arange(n)).ravel()
+        points = (group.elements[:, None] * n + np.arange(n)).ravel()
         sides = expressions.sides(group, q, expressions.retained_places(y, given))
         data = ca.MX(given.data[number - 1])
         function = expressions.many(densities_of(group.kind), len(group.data))
@@ -451,8 +450,3 @@ def spread_of(expressions: Any, q: ca.MX, y: ca.MX, given: Any) -> tuple[ca.MX, 
         pull += ca.mtimes(ca.mtimes(turned, ca.kron(ca.DM.eye(len(group.data)), beyond)), onto)
         torque += ca.mtimes(ca.reshape(couples, expressions.turns, len(points)), onto)
     return spread, pull, torque
-
-
-def elements_of(group: Group) -> Array:
-    """Numbers (n,) of the elements that the terms of a group of distributed loads act along."""
-    return np.array([int(name.rpartition(" ")[2]) for name in group.names], dtype=np.intp)

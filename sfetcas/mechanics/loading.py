@@ -21,7 +21,7 @@ from .beams import Beams, Scales
 from .bodies import Lever, body_of, lever_along, quadrature
 from .connections import freedoms
 from .elements import Element
-from .load_terms import carried, cut_of, elements_of, inner_cut
+from .load_terms import carried, cut_of, inner_cut
 from .mesh import Mesh
 from .parts import Parts
 from .rotations import Rotations
@@ -321,7 +321,7 @@ class _Writer:
         if follows:
             for i, turned in enumerate(self.connections):
                 if turned.kind.along_element:
-                    group.load(i, slice(None), forces[elements_of(turned)].reshape(len(turned.data), -1))
+                    group.load(i, slice(None), forces[turned.elements].reshape(len(turned.data), -1))
             return
         pull, on_places = carried(forces, self.segments, self.element)
         group.add("spread", part, forces[part])

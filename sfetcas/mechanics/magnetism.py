@@ -187,7 +187,7 @@ class Dipole(_InField):
 
 
 def magnets_in(parts: Parts) -> Iterator[One]:
-    """Terms of the magnets of a scene, each under the name ``magnets.NAME``, along a member with ``element NUMBER``.
+    """Terms of the magnets of a scene, each under the name ``magnets.NAME``.
 
     Raises
     ------
@@ -255,7 +255,8 @@ def _along_member(
             data += [parts.beams.tangent[number].ravel(), places[e].ravel()]
             starts = (parts.segments.place(parts.segments.parts[parts.segments.owner[number]].start),)
         sides = tuple(parts.rotations.turns[number].tolist())
-        yield One(kind, f"magnets.{name} element {number}", "", np.concatenate(data), sides, starts, loads=loads)
+        data_of = np.concatenate(data)
+        yield One(kind, f"magnets.{name}", "", data_of, sides, starts, loads=loads, element=number)
 
 
 def magnet_terms(groups: Sequence[Group], name: str) -> Iterator[tuple[int, list[int]]]:
@@ -263,6 +264,6 @@ def magnet_terms(groups: Sequence[Group], name: str) -> Iterator[tuple[int, list
     whole = f"magnets.{name}"
     for number, group in enumerate(groups):
         if group.kind.table == "magnets":
-            own = [i for i, one in enumerate(group.names) if one == whole or one.rpartition(" element ")[0] == whole]
+            own = [i for i, one in enumerate(group.names) if one == whole]
             if own:
                 yield number, own

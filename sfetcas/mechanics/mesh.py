@@ -12,6 +12,7 @@ from ..description.records import brief, counted
 from ..description.scene import Scene, check_scene
 from ..description.sections import breaks as kinks
 from ..description.showing import first_lines, shown
+from ..description.tendons import kinks_along
 from ..mathematics.arrays import Array, first_of_largest
 from .carried import carried, magnetic, natural_turning
 
@@ -102,7 +103,7 @@ class Mesh:
     touches : tuple of Touch
         Contacts with obstacles; elements end there.
     stops : tuple of (str, str)
-        Springs that are held at a stop: name, and ``low`` or ``high``.
+        Springs that are held at a stop: name, and ``low`` or ``high``; tendons that are slack: name, and ``slack``.
     cushions : tuple of Cushion
         Penalty contacts, in the order of their members and fractions.
     places : bool
@@ -160,6 +161,8 @@ def breaks_of(scene: Scene, member: str) -> Array:
     for table in (scene.actuations, scene.magnets):
         for acting in table.values():
             places += acting.breaks if acting.member == member else ()
+    for tendon in scene.tendons.values():
+        places += kinks_along(tendon, member)
     places = sorted(places)
     keep = [a for a, b in zip(places, places[1:], strict=False) if b - a > tolerances.DECIMAL]
     return np.array([*keep, 1.0])

@@ -34,13 +34,21 @@ from .pressure import is_pressure
 from .rotating_frame import RotatingFrame, with_rotating_frame
 from .rotations import RotationFreedom, Rotations, number_rotations
 from .segments import Segments, cut_members
+from .tendon_terms import tendons_in
 from .terms import Group, One, grouped
 from .unwrapping import Unwrapping, unwrapping_of
 
 __all__ = ["SOURCES", "Block", "Model", "assemble"]
 
 
-SOURCES: list[Callable[[Parts], Iterable[One]]] = [connections_in, touches_in, loads_in, actuations_in, magnets_in]
+SOURCES: list[Callable[[Parts], Iterable[One]]] = [
+    connections_in,
+    touches_in,
+    loads_in,
+    actuations_in,
+    magnets_in,
+    tendons_in,
+]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
 
 
@@ -70,7 +78,7 @@ class Model:
     positions : Positions
         Linear maps for displacements and loop closures.
     connections : tuple of Group
-        Terms of joints, springs, small members and loads.
+        Terms of joints, springs, small members, loads and tendons.
     groups : mapping
         Loadings at factor 1, by the name of their history; None: multiplied by the load factor.
     rotating_frame : RotatingFrame or None
@@ -189,7 +197,8 @@ class Model:
         Raises
         ------
         SceneError
-            The scene has contacts or springs with stops; which of them are active only :func:`sfetcas.solve` finds.
+            The scene has contacts, springs with stops or tendons that may be slack; which of them are active only
+            :func:`sfetcas.solve` finds.
         """
         scene = self.scene
         if scene.contacts and not self.mesh.touches:
@@ -199,6 +208,10 @@ class Model:
         if stopped and not self.mesh.stops:
             message = "a model by itself knows no stops, accepted: the spring without stop, or solve(scene)"
             raise SceneError(message, ("springs", stopped[0], "stop"))
+        for name, tendon in scene.tendons.items():
+            if tendon.may_be_slack and not self.mesh.stops:
+                message = "a model by itself does not find whether a tendon is slack, accepted: pushes = true, or"
+                raise SceneError(f"{message} solve(scene)", ("tendons", name))
 
     @functools.cached_property
     def members(self) -> tuple[str, ...]:
@@ -341,7 +354,7 @@ def _blocks(model: Model) -> tuple[Block, ...]:
     if len(model.positions.unknowns) > strains:
         why = "nodal assembly" if model.assembly == "nodal" else "nothing but guides hold the structure"
         if model.assembly != "nodal" and model.segments.retained:
-            why = "springs, small members, slides or followers act upon places"
+            why = "springs, tendons, small members, slides or followers act upon places"
         count = len(model.positions.unknowns) - strains
         blocks.append(Block("displacements", count, f"{why}: positions are unknowns"))
     if model.positions.rows:

@@ -22,7 +22,7 @@ import numpy as np
 from ..mathematics.arrays import Array, Index, unit
 from ..mathematics.linear import SparseMap, smallest
 from .connections import connections_of
-from .load_terms import elements_of, inner_cut
+from .load_terms import inner_cut
 from .rotations import STIFF, RotationFreedom, end_joints
 from .tables import Tables
 from .terms import GROUND
@@ -279,8 +279,10 @@ class Reactions:
         """Group, number and side of all that takes a moment at a node but members."""
         found: dict[str, list[tuple[int, int, int]]] = {}
         for number, group in enumerate(self.model.terms[1:], start=1):
-            for i, side in np.argwhere(group.turns != GROUND).tolist() if group.kind.table != "members" else ():
-                found.setdefault(group.nodes[i], []).append((number, i, side))
+            own = group.kind.table == "members" or group.kind.along_element
+            for i, side in np.argwhere(group.turns != GROUND).tolist() if not own else ():
+                node = self.model.segments.places[group.places[i, side]] if group.kind.apart else group.nodes[i]
+                found.setdefault(self._ending.get(node, node), []).append((number, i, side))
         return found
 
     def _known(self, node: str) -> Iterator[Index]:
@@ -307,10 +309,10 @@ class Reactions:
 
     @functools.cached_property
     def _along(self) -> dict[int, list[tuple[int, int]]]:
-        """Group and number of the loads along elements."""
+        """Group and number of the loads and tendons along elements."""
         found: dict[int, list[tuple[int, int]]] = {}
         for number, group in enumerate(self.model.terms):
-            for i, element in enumerate(elements_of(group).tolist() if group.kind.along_element else ()):
+            for i, element in enumerate(group.elements.tolist() if group.kind.along_element else ()):
                 found.setdefault(element, []).append((number, i))
         return found
 
@@ -326,7 +328,29 @@ class Reactions:
                 if f"loads.{name}" in group.names:
                     term = number, group.names.index(f"loads.{name}"), group.turns.shape[1] - 1
                     found.setdefault(element, []).append(term)
+        for number, i, side, element in self.jumping:
+            found.setdefault(element, []).append((number, i, side))
         return found
+
+    @functools.cached_property
+    def jumping(self) -> list[tuple[int, int, int, int]]:
+        """Group, number and side of what has a moment at a place within a member, and the element that begins there."""
+        model, places = self.model, self.model.segments.places
+        begins = {part.start: part.elements.start for part in model.segments.parts}
+        ends = {*model.nodes, *model.segments.ends.values()}
+        found = []
+        for number, group in enumerate(model.terms):
+            for i, side in np.argwhere(group.turns != GROUND).tolist() if group.kind.apart else ():
+                name = places[group.places[i, side]]
+                if name in begins and name not in ends:
+                    found.append((number, i, side, begins[name]))
+        return found
+
+    @functools.cached_property
+    def _ending(self) -> dict[str, str]:
+        """The node of each place at which the end of a member slides."""
+        scene, ends = self.model.scene, self.model.segments.ends
+        return {place: scene.members[name].nodes[-1 if i else 0] for (name, i), place in ends.items()}
 
     def _gain(self, member: str) -> list[Index]:
         """Cells of the moment on the second end of a rigid member plus that on the first: what its forces leave."""

@@ -216,7 +216,8 @@ def _at_rest(model: Any) -> tuple[Array, Array]:
 
 def _group(kind: Term, turns: Index, places: Index, data: Array, what: str) -> Group:
     names = tuple(f"turning axes on {what} {i + 1}" for i in range(len(data)))
-    return Group(kind, turns, places, data, (), names, ("",) * len(data))
+    labels = np.zeros((len(data), 0), np.intp)
+    return Group(kind, turns, places, data, (), names, ("",) * len(data), labels=labels)
 
 
 def _groups(model: Any, masses: Masses, rest: Array, inner_rest: Array) -> tuple[list[Group], list[Group]]:

@@ -15,12 +15,13 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..description.structure import SLIDING
+from ..description.tendons import Piece, holes_along, pieces_of
 from ..mathematics import interpolation
 from ..mathematics.arrays import Array, Index
 from .mesh import Mesh
 from .rotations import end_joints
 
-__all__ = ["Segment", "Segments", "cushioned", "cut_members"]
+__all__ = ["Segment", "Segments", "cushioned", "cut_members", "elongation_of"]
 
 
 @dataclass(frozen=True)
@@ -107,8 +108,13 @@ def cushioned(member: str, at: float) -> str:
     return f"{member} cushioned at {at:.17g}"
 
 
+def elongation_of(tendon: str) -> str:
+    """Name of the place whose displacement is the elongation of an elastic tendon."""
+    return f"elongation of tendons.{tendon}"
+
+
 def _retained_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
-    """Inner cuts of a member that loads need as places of their own: those that turn with the section."""
+    """Inner cuts of a member that are needed as places of their own: holes of tendons, and loads that turn with it."""
     inner = range(1, len(cuts) - 1)
     if member in _pushed(scene):
         return list(inner)
@@ -116,12 +122,20 @@ def _retained_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
     spread = [load.part for load in following if load.type == "distributed"]
     wanted = {cut for a, b in spread for cut in range(_nearest(cuts, a), _nearest(cuts, b) + 1)}
     wanted |= {_nearest(cuts, load.at or 0.0) for load in following if load.type != "distributed"}
+    for pieces in pieces_of_tendons(scene):
+        wanted |= {_nearest(cuts, at) for at in holes_along(pieces, member)}
     return [cut for cut in inner if cut in wanted]
 
 
 def _nearest(cuts: Array, place: float) -> int:
     """Index of the cut that is nearest to a fraction of the length."""
     return int(np.argmin(np.abs(cuts - place)))
+
+
+def pieces_of_tendons(scene: Scene) -> Iterator[list[Piece]]:
+    """The pieces of the way of each tendon."""
+    for tendon in scene.tendons.values():
+        yield pieces_of(tendon, scene.nodes, scene.members, scene.center_lines)
 
 
 def _pushed(scene: Scene) -> set[str | None]:
@@ -132,14 +146,18 @@ def _pushed(scene: Scene) -> set[str | None]:
 
 
 def _sprung(scene: Scene) -> Iterator[str]:
-    """Nodes whose displacement springs, small members and magnets act upon, and first nodes of what follows its
-    section.
+    """Nodes whose displacement springs, tendons, small members and magnets act upon, and first nodes of what follows
+    its section.
     """
     pushed = _pushed(scene)
     yield from (magnet.node for magnet in scene.magnets.values() if magnet.node in pushed and magnet.node is not None)
     for name in scene.members:
         if name in pushed:
             yield from scene.members[name].nodes
+    for pieces in pieces_of_tendons(scene):
+        for hole in (hole for piece in pieces if isinstance(piece, tuple) for hole in piece):
+            yield from [hole.node] if hole.node is not None else []
+            yield from scene.members[hole.member].nodes if hole.member is not None else ()
     for spring in scene.springs.values():
         if spring.type == "translational":
             yield from (node for node in (spring.node, spring.to) if node is not None)
@@ -180,6 +198,10 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
             parts.append(Segment(name, slice(begin + a, begin + b), here, there))
             here = there
         begin += len(cuts) - 1
+    for name, tendon in scene.tendons.items():
+        if tendon.stiffness is not None:
+            places.append(elongation_of(name))
+            retained.add(elongation_of(name))
     # Turning axes act upon all that has mass.
     retained |= set(scene.nodes) if scene.rotating is not None else set()
     retained |= set(_sprung(scene)) | {load.node for load in scene.loads.values() if load.follows and load.node}

@@ -20,6 +20,7 @@ __all__ = [
     "fibre_strain",
     "moved_rotation",
     "rotation_between",
+    "spin_of",
     "turned_vector",
     "weighted_product",
 ]
@@ -80,6 +81,14 @@ def rotation_between(space: bool) -> ca.Function:
     # The angle over its half sine, to all digits also where it vanishes.
     share = ca.if_else(sine < 1e-6, 2.0, 2.0 * ca.atan2(sine, r[0]) / sine)
     return ca.Function(f"vectors_{tag(space)}", [q, p], [share * r[1:]])
+
+
+@functools.cache
+def spin_of() -> ca.Function:
+    """``(q, slope) -> 2 conj(q) slope``: curvature in space of a unit quaternion and its derivative, as a vector."""
+    q, slope = ca.SX.sym("q", 4), ca.SX.sym("slope", 4)
+    spin = product([q[0], -q[1], -q[2], -q[3]], ca.vertsplit(slope))[1:]
+    return ca.Function("spin", [q, slope], [2.0 * ca.vertcat(*spin)])
 
 
 @functools.cache

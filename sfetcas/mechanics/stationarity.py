@@ -13,7 +13,6 @@ import numpy as np
 from ..mathematics.arrays import Index
 from ..mathematics.constants import picked, sparse, times
 from .expressions import Expressions, Given
-from .load_terms import elements_of
 from .tables import Places
 from .terms import rotation_forces, rotation_gradient
 
@@ -66,7 +65,7 @@ class Stationarity:
         places, self._closed = expressions.retained_places(y, given), expressions.open_gaps(y, given)
         self.shares: list[tuple[Index, ca.MX]] = []
         self.entries: list[ca.MX] = []
-        self.on_places, self._rows = forces.on_places - given.force, []
+        self.on_places, rows = forces.on_places - given.force, list[tuple[int, ca.MX]]()
         self.rotation_jacobian = ca.MX(expressions.axes, 0)
         for number, group in enumerate(model.terms):
             n, function = len(group.data), rotation_gradient(group.kind) if entries else rotation_forces(group.kind)
@@ -84,8 +83,8 @@ class Stationarity:
             self.shares.append((tables.sides[number], acting))
             if number == 0:
                 self._closed += times(expressions.closing, ca.vec(gaps))
-            elif group.rows:
-                self._rows.append(ca.vec(gaps))
+            elif group.labels.size:
+                rows.append((number, ca.vec(gaps)))
             if not entries:
                 continue
             self.entries.append(ca.vec(stiff[0]))
@@ -93,8 +92,9 @@ class Stationarity:
                 self.rotation_jacobian, closed = stiff[1], tables.closed
                 rotation_jacobians = picked(ca.vec(self.rotation_jacobian), closed.entry) * ca.DM(closed.value)
                 self.entries += [rotation_jacobians, rotation_jacobians]
-            elif group.rows:
+            elif group.labels.size:
                 self.entries += [ca.vec(stiff[1])] * 2
+        self._rows = expressions.stacked(rows)
 
     @property
     def pull(self) -> ca.MX:
@@ -106,20 +106,20 @@ class Stationarity:
         return own + constant[:, each.tolist()]
 
     def moments(self, nodes: Index) -> ca.MX:
-        """Moments (turns, n) that elements, and follower loads along them, take from given nodes of elements."""
+        """Moments (turns, n) that elements, and what acts along them, take from given nodes of elements."""
         expressions = self._expressions
         width = expressions.turns * expressions.points
         own = ca.vec(self.shares[0][1][:width, :])
         for group, (_, values) in zip(expressions.model.terms, self.shares, strict=True):
             if group.kind.along_element:
-                cells = (elements_of(group)[:, None] * width + np.arange(width)).ravel()
+                cells = (group.elements[:, None] * width + np.arange(width)).ravel()
                 onto = sparse(cells, np.arange(len(cells)), np.ones(len(cells)), (own.shape[0], len(cells)))
                 own += times(onto, ca.vec(values[:width, :]))
         return ca.reshape(own, expressions.turns, -1)[:, nodes.tolist()]
 
     def gathered(self, more: list[tuple[Index, ca.MX]]) -> ca.MX:
         """The residual with further forces and moments on sides added."""
-        rows = [self._closed, *self._rows]
+        rows = [self._closed, self._rows]
         return self._expressions.gathered([*self.shares, *more], self.on_places, self._lam, rows)
 
     @functools.cached_property

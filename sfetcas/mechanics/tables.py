@@ -136,12 +136,9 @@ class Tables:
         self._number()
         self._full()
         self.sides = [self.sides_of(group) for group in model.terms]
-        self.labels, first = [np.zeros((len(model.terms[0].data), 0), np.intp)], len(model.positions.rows)
-        for group in model.connections:
-            self.labels.append(
-                self.of_rows + first + np.arange(len(group.rows)).reshape(len(group.data), group.kind.sizes[2])
-            )
-            first += len(group.rows)
+        first = self.of_rows + len(model.positions.rows)
+        self.labels = [np.zeros((len(model.terms[0].data), 0), np.intp)]
+        self.labels += [first + group.labels for group in model.connections]
 
     def _number(self) -> None:
         model, turns = self.model, self.width

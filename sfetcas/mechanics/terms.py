@@ -97,10 +97,15 @@ class Term(Components, abc.ABC):
     """What a prescribed motion gives by its ``load``: ``angle`` or ``travel``; empty where it is no driven joint."""
 
     along_element: ClassVar[bool] = False
-    """Whether it acts along an element, whose rotations are its sides, before the place at its start where it has one.
-
-    Its name ends on the number of the element.
+    """Whether it acts along an element, whose rotations are its sides, so that its moments are among those of the
+    element; before the place at its start where it has one.
     """
+
+    apart: ClassVar[bool] = False
+    """Whether its first rotation has its moment at its first place, its second one at its second place."""
+
+    shares_row: ClassVar[bool] = False
+    """Whether its rows of the same name as those of other terms are one row, to which each adds its share."""
 
     on_face: ClassVar[bool] = False
     """Whether its row keeps a place on the surface of an obstacle."""
@@ -271,6 +276,8 @@ class One:
         Name of its rows.
     loads : mapping of str or None to ndarray (loads,)
         Data that grow with a history, or with the load factor (None), at factor 1, beside the loads of the scene.
+    element : int
+        Number of the element whose rotations are its sides; -1 where there is none.
     """
 
     kind: Term
@@ -281,6 +288,7 @@ class One:
     places: tuple[int, ...] = ()
     row: str = ""
     loads: Mapping[str | None, Array] = field(default_factory=dict)
+    element: int = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,13 +302,18 @@ class Group:
         Numbers of the sides.
     data : ndarray (n, data)
     rows : tuple of str
-        Names of the rows that have multipliers of their own, those of the first term first.
+        Names of the rows that have multipliers of their own, those of the first term first; rows that are shared stand
+        with the first term that has them.
     names : tuple of str
         For each term the record that it belongs to: a spring, member, motion, load, or joint.
     nodes : tuple of str
         For each term the node at which it is; of a small member its first.
     loads : mapping of str or None to ndarray (n, loads)
         Data that grow with a history, or with the load factor (None), at factor 1, beside the loads of the scene.
+    labels : ndarray (n, rows)
+        Numbers of the rows of each term among those of all groups beside the elements.
+    elements : ndarray (n,)
+        Numbers of the elements whose rotations are the sides; -1 where there is none.
     """
 
     kind: Term
@@ -311,6 +324,13 @@ class Group:
     names: tuple[str, ...]
     nodes: tuple[str, ...]
     loads: Mapping[str | None, Array] = field(default_factory=dict)
+    labels: Index = field(default_factory=lambda: np.zeros((0, 0), np.intp))
+    elements: Index = field(default_factory=lambda: np.zeros(0, np.intp))
+
+    @property
+    def shared(self) -> bool:
+        """Whether some of its rows are shared, so that they do not stand one after the other."""
+        return self.labels.size != len(self.rows)
 
 
 def grouped(ones: Iterable[One]) -> tuple[Group, ...]:
@@ -318,11 +338,22 @@ def grouped(ones: Iterable[One]) -> tuple[Group, ...]:
     found: dict[Term, list[One]] = {}
     for one in ones:
         found.setdefault(one.kind, []).append(one)
-    return tuple(_group(kind, found[kind]) for kind in sorted(found, key=lambda kind: kind.is_couple))
+    groups, known, count = list[Group](), dict[str, int](), 0
+    for kind in sorted(found, key=lambda kind: kind.is_couple):
+        groups.append(_group(kind, found[kind], known, count))
+        count += len(groups[-1].rows)
+    return tuple(groups)
 
 
-def _group(kind: Term, ones: list[One]) -> Group:
+def _group(kind: Term, ones: list[One], known: dict[str, int], first: int) -> Group:
+    """The group of a kind; ``known`` collects the numbers of rows that are shared, ``first`` is that of its first."""
     turns, places, rows, data, loads = kind.sizes
+    named = [one.row if rows == 1 else f"{one.row or one.name}, {c + 1} of {rows}" for one in ones for c in range(rows)]
+    numbered = first + np.arange(len(named), dtype=np.intp)
+    if kind.shares_row:
+        own = [name for name in dict.fromkeys(named) if name not in known]
+        known |= {name: first + i for i, name in enumerate(own)}
+        numbered, named = np.array([known[name] for name in named], dtype=np.intp), own
     n, histories = len(ones), dict.fromkeys(history for one in ones for history in one.loads)
     nothing = np.zeros(loads)
     return Group(
@@ -330,12 +361,12 @@ def _group(kind: Term, ones: list[One]) -> Group:
         turns=np.array([one.turns for one in ones], dtype=np.intp).reshape(n, turns),
         places=np.array([one.places for one in ones], dtype=np.intp).reshape(n, places),
         data=numbers([one.data for one in ones]).reshape(n, data),
-        rows=tuple(
-            f"{one.row or one.name}, {c + 1} of {rows}" if rows > 1 else one.row for one in ones for c in range(rows)
-        ),
+        rows=tuple(named),
         names=tuple(one.name for one in ones),
         nodes=tuple(one.node for one in ones),
         loads={history: numbers([one.loads.get(history, nothing) for one in ones]) for history in histories},
+        labels=numbered.reshape(n, rows),
+        elements=np.array([one.element for one in ones], dtype=np.intp),
     )
 
 

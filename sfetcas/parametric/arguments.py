@@ -107,13 +107,13 @@ class Argument:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Least and largest accepted value: the range; else above zero for sections, from zero for ``stiffness``."""
+        """Least and largest accepted value: the range; else above zero for sections, from zero for a tension."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
         signed = ".polynomial" in self.name or ".coupling" in self.name
         if self.name.startswith("sections.") and not signed:
             return float(np.nextafter(0.0, 1.0)), np.inf
-        return (0.0 if self.name.endswith(".stiffness") else -np.inf), np.inf
+        return (0.0 if self.name.endswith(NOT_NEGATIVE) else -np.inf), np.inf
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -122,6 +122,9 @@ class Argument:
             return (self.name,)
         return tuple(f"{self.name}.{i}" for i in self.components)
 
+
+NOT_NEGATIVE = (".stiffness", ".tension", ".pressure", ".area")
+"""Ends of the names of numbers that are zero or above."""
 
 Asked = Sequence[str] | Mapping[str, tuple[float, float] | Parameter | None] | None
 """Names of numbers, or a mapping of them to ranges (None: no range) or :class:`Parameter`; None: defaults."""
@@ -203,11 +206,14 @@ def single_numbers(scene: Scene, values: Mapping[str, ArrayLike]) -> dict[str, f
 
 
 def default_arguments(scene: Scene) -> list[str]:
-    """Names of the default arguments: the load factor, the histories, all loads, and all prescribed motions."""
+    """Names of the default arguments: the load factor, the histories, loads, tendons, actuations, fields, motions."""
     free = [one for _, _, one in scene.driven if one.history is None]
     names = [FACTOR] if free or scene.gravity is not None else []
     names += [f"histories.{name}" for name in scene.histories]
     names += [f"loads.{name}.value" for name in scene.loads]
+    for name, tendon in scene.tendons.items():
+        pulls = ("tension", "pressure", "pull", "length")
+        names += [f"tendons.{name}.{key}" for key in pulls if getattr(tendon, key) is not None]
     names += [f"actuations.{name}.value" for name in scene.actuations]
     names += [f"fields.{name}.{'value' if field.value else 'moment'}" for name, field in scene.fields.items()]
     for name, motion in scene.motions.items():
@@ -371,6 +377,13 @@ UNITS = {
     "E": "Pa",
     "G": "Pa",
     "rho": "kg/m3",
+    "tension": "N",
+    "pull": "m",
+    "length": "m",
+    "offset": "m",
+    "ground": "m",
+    "pressure": "Pa",
+    "area": "m2",
     "factor": "1",
     "moment": "A m2",
     "moment_density": "A m",
@@ -388,6 +401,8 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
     if path[0] == "springs" and len(path) > 2:
         turning = scene.springs[path[1]].type == "rotational"
         return {"stiffness": "N m" if turning else "N/m", "rest": "rad" if turning else "m"}.get(key, "m")
+    if path[0] == "tendons" and key == "stiffness":
+        return "N/m"
     if path[0] == "sections":
         if re.match(r"EI|GJ|coupling", key):
             return "N m2"
@@ -401,7 +416,7 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
 
 def _meaning(path: Sequence[str]) -> str:
     kinds = {"loads": "load", "motions": "motion", "sections": "section", "nodes": "node", "springs": "spring"}
-    kinds |= {"actuations": "actuation", "fields": "field", "magnets": "magnet"}
+    kinds |= {"tendons": "tendon", "actuations": "actuation", "fields": "field", "magnets": "magnet"}
     if len(path) < 2:
         return path[0]
     return f"{'.'.join(path[2:])} of the {kinds.get(path[0], path[0])} {path[1]}"

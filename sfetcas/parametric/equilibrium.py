@@ -237,6 +237,10 @@ def refuse_search(scene: Scene, lacking: str = "not exported") -> None:
         if spring.stop is not None:
             message = f"which stops act is found by a search that is {lacking}, {instead}"
             raise SceneError(message, ("springs", name, "stop"))
+    for name, tendon in scene.tendons.items():
+        if tendon.may_be_slack:
+            message = f"whether a tendon is slack is found by a search that is {lacking}, accepted: pushes = true, with"
+            raise SceneError(f"{message} which it is kept as long as given, or a stiffness", ("tendons", name))
     if scene.rotating is not None:
         raise SceneError(f"turning axes are {lacking}, {instead}", ("rotating",))
 

@@ -17,16 +17,17 @@ from ..description.answers import PARAMETERS, STEPS, AnswerName, answer_name, ch
 from ..description.records import unknown
 from ..errors import SceneError
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, numbers
+from ..mathematics.arrays import Array, numbers, values_of
 from ..mathematics.constants import sparse, times
 from ..mechanics.connections import connections_of
-from ..mechanics.load_terms import elements_of, spread_of
+from ..mechanics.load_terms import spread_of
 from ..mechanics.magnetism import magnet_terms
 from ..mechanics.model import Model
 from ..mechanics.reactions import Reactions
-from ..mechanics.singles import fibre_strain, turned_vector
+from ..mechanics.singles import fibre_strain, spin_of, turned_vector
 from ..mechanics.stationarity import Stationarity
 from ..mechanics.stations import Stations
+from ..mechanics.tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
 from ..mechanics.terms import answers_of
 from ..solvers.program import Program
 
@@ -86,6 +87,7 @@ def default_results(model: Model, *, unique: bool = True) -> list[str]:
     for name, spring in model.scene.springs.items():
         pair = ("angle", "moment") if spring.type == "rotational" else ("travel", "force")
         names += [f"springs.{name}.{field}" for field in pair]
+    names += [f"tendons.{name}.{field}" for name in model.scene.tendons for field in ("tension", "length")]
     return [*names, "energy.elastic", "energy.potential"]
 
 
@@ -106,6 +108,7 @@ WHOSE = {
     "reactions": "that the ground exerts at the node",
     "members": "of the member",
     "springs": "of the spring",
+    "tendons": "of the tendon",
     "motions": "of the motion",
     "magnets": "of the magnet",
     "energy": "energy",
@@ -203,6 +206,13 @@ class Results:
             if name.component is not None and single_number(motion, kind.key):
                 raise SceneError(f"found {name.bare!r}, which is one number here, accepted: {name.quantity}")
 
+    @property
+    def strung(self) -> list[str]:
+        """Members along which tendons run, whose section forces are asked for."""
+        asked = (result.asked for result in self.results if result.asked.kind.along)
+        by_forces = dict.fromkeys(name.record for name in asked if name.kind.key in BY_FORCES)
+        return [name for name in by_forces if stretches_of(self.model.scene, name)]
+
     # -- what they are ------------------------------------------------------------------------------
 
     @property
@@ -231,7 +241,12 @@ class Results:
         nodes = [numbers(scene.nodes[name].position) for name in model.nodes]
         along = [scene.center_lines[name].positions(np.array(x)) for name, x in self.every.items()]
         sections = [self._sections(model, name).ravel() for name in self.curved]
+        sections += [self.strung_data(model, name).ravel() for name in self.strung]
         return np.concatenate([*nodes, *(part.ravel() for part in along), *sections])
+
+    def strung_data(self, model: Model, member: str) -> Array:
+        """Of the tendons along a member at its places, see :func:`~sfetcas.mechanics.tendon_shares.section_data`."""
+        return section_data(model, member, np.array(self.every[member]), self.model.scales)
 
     def _sections(self, model: Model, member: str) -> Array:
         """Of a member at its places, (places, 24).
@@ -252,6 +267,10 @@ class Results:
         scene = self.model.scene
         values = scene.sections[str(scene.members[member].section)].stiffness(np.array(self.every[member]))
         return numbers(np.nanmax(values, axis=1))
+
+    def lengths(self, member: str) -> Array:
+        """Lengths (elements,) of the elements of a member, dimensionless."""
+        return np.asarray(values_of(self.model.beams.weight[self.model.elements_of(member)])).sum(axis=1)
 
     def bent(self, member: str, moment: ca.MX, axes: Callable[[ca.MX], ca.MX], sections: ca.MX) -> ca.MX:
         """Change of the curvature about the axes of the sections, (3, places), 1/m.
@@ -294,9 +313,12 @@ class _Outputs:
         count = len(model.nodes)
         along = [len(x) for x in results.every.values()]
         curved = [24 * len(results.every[name]) for name in results.curved]
-        bounds = np.cumsum([0, 3 * count, *(3 * n for n in along), *curved]).tolist()
+        strung = [results.strung_data(model, name).shape for name in results.strung]
+        bounds = np.cumsum([0, 3 * count, *(3 * n for n in along), *curved, *(a * b for a, b in strung)]).tolist()
         nodes, *members = ca.vertsplit(rest, bounds)
-        sections = members[len(along) :]
+        sections = members[len(along) : len(along) + len(curved)]
+        pairs = zip(results.strung, strung, members[len(along) + len(curved) :], strict=True)
+        self._tendons = {name: ca.reshape(x, shape[1], shape[0]) for name, shape, x in pairs}
         self._sections = {n: ca.reshape(x, 24, -1) for n, x in zip(results.curved, sections, strict=True)}
         self._rest = ca.reshape(nodes, 3, count)
         self._along = {n: ca.reshape(x, 3, -1) for n, x in zip(results.every, members, strict=False)}
@@ -325,6 +347,8 @@ class _Outputs:
             return self._connection("springs", record, key)
         if kind.table == "magnets":
             return self._magnet(record, key)
+        if kind.table == "tendons":
+            return self._tendon(record, key)
         tables = {"nodes": self._node, "reactions": self._reaction, "members": self._member, "motions": self._motion}
         return tables[kind.table](record, key)
 
@@ -468,7 +492,7 @@ class _Outputs:
         for number, group in enumerate(model.terms):
             if group.kind.table != "actuations":
                 continue
-            of_element = elements_of(group) - part.start
+            of_element = group.elements - part.start
             own = np.flatnonzero((of_element >= 0) & (of_element < part.stop - part.start))
             if len(own):
                 points = (of_element[own][:, None] * n + np.arange(n)).ravel()
@@ -499,10 +523,37 @@ class _Outputs:
         at, n = self._stations(member), self._expressions.points
         spread, pull, _ = self._spread
         first = (n * (self._model.elements_of(member).start + at.elements)).tolist()
-        return self._three(self._points(spread, member, self._within(member, at.spread)) - pull[:, first])
+        found = self._three(self._points(spread, member, self._within(member, at.spread)) - pull[:, first])
+        return found - self._strung(member)[1] if member in self._tendons else found
 
     def _moment(self, member: str) -> ca.MX:
-        """Section moment at the places, (3, places): that at the first node of the element, and what forces add."""
+        """Section moment at the places, (3, places)."""
+        return self._strung(member)[0] if member in self._tendons else self._cut(member)
+
+    def _strung(self, member: str) -> tuple[ca.MX, ca.MX]:
+        """Section moment, and force of tendons along a member, at the places, (3, places) each."""
+        model, at, moment = self._model, self._stations(member), self._cut(member)
+        part, turns = model.elements_of(member), self._expressions.turns
+        names = [name for name, _ in stretches_of(model.scene, member)]
+        tensions = ca.vertcat(*(self._tendon(name, "tension") for name in names)) / model.scales.force
+        nodes = model.rotations.turns[part][at.elements]
+        lengths = np.asarray(self._results.lengths(member))[at.elements]
+        pairs = zip(nodes, at.slopes / lengths[:, None], strict=True)
+        slope = ca.horzcat(*(ca.mtimes(self._q[:, t.tolist()], ca.DM(row)) for t, row in pairs))
+        q, n = self._rotations(member).T, len(nodes)
+        back, guess = moment[3 - turns :, :], slope
+        if model.space:
+            opposite = ca.vertcat(q[0, :], -q[1:, :])
+            back = self._expressions.many(turned_vector(True), n)(opposite, moment)
+            guess = self._expressions.many(spin_of(), n)(q, slope)
+        function = self._expressions.many(share_of(model.space, len(names), NEWTON_STEPS), n)
+        about, along = function(back, guess, self._tendons[member], ca.repmat(tensions, 1, n))
+        turned = self._expressions.many(turned_vector(model.space), n)
+        force = self._three(turned(q, along))
+        return moment - (turned(q, about) if model.space else self._about(about)), force
+
+    def _cut(self, member: str) -> ca.MX:
+        """Moment through cuts, (3, places): that at the first node of the element, and what forces add."""
         expressions, model = self._expressions, self._model
         at = self._stations(member)
         own = self._found.moments(expressions.points * (model.elements_of(member).start + at.elements))
@@ -518,10 +569,13 @@ class _Outputs:
 
     def _connection(self, table: str, name: str, key: str) -> ca.MX:
         """What the connection of a name tells."""
-        expressions, given = self._expressions, self._program.given
         groups = self._model.terms
         number, i = next(x for x in connections_of(groups, table, name) if key in groups[x[0]].kind.answers)
-        group = groups[number]
+        return self._told(number, i, key)
+
+    def _told(self, number: int, i: int, key: str) -> ca.MX:
+        """A quantity of one term of a group."""
+        expressions, given, group = self._expressions, self._program.given, self._model.terms[number]
         turns, places, _, _, _ = group.kind.sizes
         turned, moved = expressions.sides(group, self._q, ca.vec(self._places))
         found = answers_of(group.kind)(
@@ -550,6 +604,14 @@ class _Outputs:
             "force": (slice(4, 7), model.scales.force),
         }[key]
         return total[rows].T * unit
+
+    def _tendon(self, name: str, key: str) -> ca.MX:
+        """Tension, or length as the sum over its parts."""
+        found = []
+        for number, group in enumerate(self._model.terms):
+            own = [i for i, each in enumerate(group.names) if each == name and group.kind.table == "tendons"]
+            found += [self._told(number, i, key) for i in own[: None if key == "length" else 1]]
+        return sum(found[1:], found[0]) if key == "length" else found[0]
 
     # -- stiffness ----------------------------------------------------------------------------------
 

@@ -22,7 +22,6 @@ from ..mathematics.linear import pattern
 from ..mechanics.beams import ELEMENT_DATA
 from ..mechanics.equations import UNLOADED, State
 from ..mechanics.expressions import LOADS, Expressions, Given, moved_by
-from ..mechanics.load_terms import elements_of
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import RotationFreedom
@@ -175,7 +174,7 @@ class Program:
         for number, group in enumerate(self.model.terms):
             if group.kind.table == "actuations":
                 energies = expressions.many(energies_of(group.kind), len(group.data))(*self._arguments[number])[1]
-                rows, count = elements_of(group), len(group.data)
+                rows, count = group.elements, len(group.data)
                 found += times(
                     sparse(rows, np.arange(count), np.ones(count), (expressions.elements, count)), energies.T
                 ).T
@@ -414,7 +413,7 @@ class Program:
             total += times(expressions.sizes_onto_unknowns(sides), ca.vec(sizes))
         if equations.displacement_unknowns:
             closings = len(model.positions.rows)
-            acting = times(model.positions.W.T.absolute, ca.fabs(lam[:closings]))
+            acting = times(model.positions.W.T.absolute, ca.fabs(lam[:closings, :]))
             acting += times(model.positions.Y.T.absolute, ca.fabs(found.on_places))
             acting += UNLOADED * ca.norm_inf(acting) + 1e-12
             rotation_unknowns = equations.rotation_unknowns

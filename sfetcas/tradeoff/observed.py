@@ -169,5 +169,4 @@ def expected_error(scene: Scene, answer: Answer) -> tuple[float, int, int] | Non
 
 def refinable(scene: Scene, answer: Answer) -> bool:
     """Whether an answer can be refined by itself, so that its error does not depend on which of several it is."""
-    stopped = any(spring.stop is not None for spring in scene.springs.values())
-    return isinstance(answer, Solution) and not scene.contacts and not stopped
+    return isinstance(answer, Solution) and not scene.contacts and not scene.stopped

@@ -98,10 +98,16 @@ class ControlledSystem:
     def _refuse(self, controls: Sequence[Control], variables: Sequence[Variable]) -> None:
         scene, names = self.scene, [one.name for one in controls]
         for name in names:
-            if not name.startswith(("loads.", "histories.")):
-                accepted = "a component of the value of a load, or histories.NAME of a load"
+            if not name.startswith(("loads.", "histories.", "tendons.")):
+                accepted = "a component of the value of a load, or histories.NAME of a load, or a number of a tendon"
                 raise SceneError(f"found {name!r}, accepted: {accepted}", ("controls",))
-        used = {load.history for load in scene.loads.values() if load.history is not None}
+        for name, tendon in scene.tendons.items():
+            controlled = any(one.startswith(f"tendons.{name}.") for one in names) or tendon.history is not None
+            if controlled and tendon.measured and tendon.stiffness is None:
+                message = "found a control of a length that has to be followed at once, accepted: of a tension, or of a"
+                raise SceneError(f"{message} tendon with a stiffness", ("controls", f"tendons.{name}"))
+        histories = [load.history for load in scene.loads.values()]
+        used = {name for name in (*histories, *(t.history for t in scene.tendons.values())) if name is not None}
         for name in sorted(used):
             if f"histories.{name}" not in names:
                 message = f"found the history {name!r}, accepted: loads that are constant or controlled"
@@ -268,7 +274,8 @@ class ControlledSystem:
 
 def _nothing_bends(scene: Scene) -> bool:
     """Whether nothing resists a motion by its stiffness."""
-    return not scene.springs and all(member.type == "rigid" for member in scene.members.values())
+    elastic = any(tendon.stiffness is not None for tendon in scene.tendons.values())
+    return not scene.springs and not elastic and all(member.type == "rigid" for member in scene.members.values())
 
 
 def _null_space(rows: Array) -> Array:

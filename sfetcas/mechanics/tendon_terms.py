@@ -1,0 +1,297 @@
+"""Tendons as terms: their tension times their length, or their length as a constraint with the tension as multiplier.
+
+Along an element the way has the offset ``d(s)`` from the centre line in axes of the undeformed scene that turn with
+the sections, so that the derivative of its places by the arc length has the length
+
+    | R_0 (t_0 + kappa_0 x d + d') + (kappa - kappa_0) x d |,
+
+in which everything is in the axes before the rotation: a function of the rotations of the element alone.  A straight
+piece goes from a hole ``x_a + R_a d_a`` to a hole ``x_b + R_b d_b``, a function of two rotations and two places.
+
+A tendon whose force is given has the energy tension times change of length.  One whose length is given is one row,
+to which all its parts add, and its multiplier is the tension; where it is elastic a further place, of which nothing
+else is at, has its elongation as displacement.
+
+Source: Rao, Peyron, Lilge and Burgner-Kahrs, Frontiers in Robotics and AI 7, 630245 (2021), for the two ways to route.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, final
+
+import casadi as ca
+import numpy as np
+
+from ..description.tendons import Hole, Stretch, Tendon, pieces_of, tangent
+from ..mathematics.arrays import Array, numbers
+from .elements import Element
+from .parts import Parts
+from .segments import elongation_of
+from .terms import GROUND, One, Side, Term
+
+__all__ = ["Elongation", "Routed", "Strung", "tendons_in"]
+
+
+@dataclass(frozen=True)
+class _Part(Term):
+    """A part of a tendon, with a length; the last data are its length at rest, and one that does not change.
+
+    Attributes
+    ----------
+    given : bool
+        Whether the length of the tendon is given, not its tension.
+    """
+
+    table: ClassVar[str] = "tendons"
+    answers: ClassVar[Mapping[str, str]] = {"tension": "N", "length": "m"}
+    shares_row: ClassVar[bool] = True
+
+    given: bool
+
+    def length(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
+        """Length at a state."""
+        raise NotImplementedError
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """The tension times the change of the length."""
+        return ca.SX(0) if self.given else load * (self.length(q, u, data) - data[data.shape[0] - 2])
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The change of the length, and the shortening of the free length."""
+        return [self.length(q, u, data) - data[data.shape[0] - 2] + load] if self.given else []
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The tension, and the length of this part with that which does not change."""
+        return [lam if self.given else load, self.length(q, u, data) + data[data.shape[0] - 1]]
+
+
+@final
+@dataclass(frozen=True)
+class Routed(_Part):
+    """A tendon along one element.
+
+    Data: at each point the derivative of its places times weight and length, then its arm times weight.
+
+    Attributes
+    ----------
+    element : Element
+    """
+
+    along_element: ClassVar[bool] = True
+
+    element: Element
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """The rotations of the element."""
+        n = self.element.order + 1
+        return n, 0, int(self.given), 2 * n * self.axes + 2, 1
+
+    def length(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
+        """Sum over the points."""
+        n, axes = self.element.order + 1, self.axes
+        forward, arm = (ca.reshape(data[i * n * axes : (i + 1) * n * axes], axes, n) for i in range(2))
+        here, slope = self.element.at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
+        total = ca.SX(0)
+        for k in range(n):
+            if self.space:
+                turned = ca.cross(self.element.curvature(here[:, k], slope[:, k]), arm[:, k])
+            else:
+                turned = slope[0, k] * ca.vertcat(-arm[1, k], arm[0, k])
+            total += ca.norm_2(forward[:, k] + turned)
+        return total
+
+
+@final
+@dataclass(frozen=True)
+class Strung(_Part):
+    """A straight piece between two holes; data: vector between them at rest, arms of both."""
+
+    one_sided: ClassVar[bool] = True
+    apart: ClassVar[bool] = True
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """Two rotations and two places."""
+        return 2, 2, int(self.given), 3 * self.axes + 2, 1
+
+    def length(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
+        """Distance of the holes."""
+        n = self.axes
+        gap = data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])
+        moved = [
+            self.turned_back(self.reverse(side), ca.vertsplit(data[n * i : n * i + n])) for i, side in enumerate(q, 1)
+        ]
+        return ca.norm_2(gap + ca.vertcat(*moved[1]) - ca.vertcat(*moved[0]))
+
+    def reverse(self, q: Side) -> Side:
+        """The opposite rotation."""
+        return [q[0], -q[1], -q[2], -q[3]] if self.space else [-q[0]]
+
+
+@final
+@dataclass(frozen=True)
+class Elongation(Term):
+    """What an elastic tendon is longer than its free length: the first displacement of a place; data: stiffness.
+
+    Attributes
+    ----------
+    pushes : bool
+        Whether it resists being shorter too.
+    """
+
+    shares_row: ClassVar[bool] = True
+
+    pushes: bool
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One place, one row."""
+        return 0, 1, 1, 1, 0
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Half the stiffness times the square of the elongation."""
+        along = u[0][0] if self.pushes else ca.fmax(u[0][0], 0.0)
+        return 0.5 * data[0] * (along**2 + sum((across**2 for across in u[0][1:]), ca.SX(0)))
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Its share of the row of the tendon."""
+        return [-u[0][0]]
+
+
+# -- of a scene -------------------------------------------------------------------------------------
+
+
+def tendons_in(parts: Parts) -> Iterator[One]:
+    """Terms of the tendons and chambers of a scene."""
+    for name, tendon in parts.scene.tendons.items():
+        yield from _Maker(parts, name, tendon).all()
+
+
+@dataclass(frozen=True, eq=False)
+class _Maker:
+    parts: Parts
+    name: str
+    tendon: Tendon
+
+    @property
+    def axes(self) -> int:
+        return self.parts.element.axes
+
+    @property
+    def given(self) -> bool:
+        """Whether its length is a constraint; of a slack tendon it is not."""
+        return self.tendon.measured and (self.name, "slack") not in self.parts.mesh.stops
+
+    def all(self) -> Iterator[One]:
+        scene, scales = self.parts.scene, self.parts.scales
+        pieces = pieces_of(self.tendon, scene.nodes, scene.members, scene.center_lines)
+        found, still = list[One](), 0.0
+        for piece in pieces:
+            if isinstance(piece, tuple):
+                found.append(self._strung(*piece))
+            elif scene.members[piece.member].type == "rigid":
+                still = still + _length(piece, scene.center_lines[piece.member]) / scales.length
+            else:
+                found += self._routed(piece)
+        rest = sum((one.data[-2] for one in found), still)
+        history = self.tendon.history
+        for i, one in enumerate(found):
+            data = one.data if i else np.concatenate([one.data[:-1], np.reshape(numbers(still), (1,))])
+            yield One(
+                one.kind,
+                self.name,
+                one.node,
+                numbers(data),
+                one.turns,
+                one.places,
+                one.row,
+                self._load(i, rest, history),
+                one.element,
+            )
+        if self.tendon.stiffness is not None:
+            stiffness = np.array([1.0]) * self.tendon.stiffness * scales.length / scales.force
+            place = self.parts.segments.place(elongation_of(self.name))
+            kind = Elongation(self.parts.element.space, self.tendon.pushes)
+            yield One(kind, self.name, "", numbers(stiffness), (), (place,), f"tendons.{self.name}")
+
+    def _load(self, i: int, rest: Any, history: str | None) -> dict[str | None, Array]:
+        """Tension of each part, or the shortening with the first part alone."""
+        tendon, scales = self.tendon, self.parts.scales
+        if not tendon.measured:
+            return {history: np.reshape(numbers(tendon.force / scales.force), (1,))}
+        if i or not self.given:
+            return {}
+        pull = (
+            rest - tendon.length / scales.length if tendon.length is not None else (tendon.pull or 0.0) / scales.length
+        )
+        return {history: np.reshape(numbers(pull), (1,))}
+
+    def _strung(self, first: Hole, last: Hole) -> One:
+        space, unit, n = self.parts.element.space, self.parts.scales.length, self.axes
+        gap, *arms = (numbers(v[:n] / unit) for v in (last.position - first.position, first.arm, last.arm))
+        data = np.concatenate([gap, *arms, np.reshape(numbers(np.linalg.norm(gap)), (1,)), np.zeros(1)])
+        turns, places = (self._turn(first), self._turn(last)), (self._place(first), self._place(last))
+        return One(Strung(space, self.given), self.name, "", numbers(data), turns, places, self._row)
+
+    @property
+    def _row(self) -> str:
+        return f"tendons.{self.name}" if self.given else ""
+
+    def _cut(self, hole: Hole) -> int:
+        return self.parts.mesh.cut_at(str(hole.member), hole.at)
+
+    def _place(self, hole: Hole) -> int:
+        """Place at which a hole pulls."""
+        segments = self.parts.segments
+        if hole.member is None:
+            return GROUND if hole.node is None else segments.place(hole.node)
+        parts = [part for part in segments.parts if part.member == hole.member]
+        at = parts[0].elements.start + self._cut(hole)
+        return segments.place(next((part.start for part in parts if part.elements.start == at), parts[-1].end))
+
+    def _turn(self, hole: Hole) -> int:
+        """Rotation with which a hole turns; of a node without a rotation of its own none, as it has no arm."""
+        rotations, order = self.parts.rotations, self.parts.element.order
+        if hole.member is None:
+            number = None if hole.node is None else rotations.node_turn[hole.node]
+            return GROUND if number is None else number
+        runs = [part.elements for part in self.parts.segments.parts if part.member == hole.member]
+        return int(rotations.chain(slice(runs[0].start, runs[-1].stop))[self._cut(hole) * order])
+
+    def _routed(self, piece: Stretch) -> Iterator[One]:
+        """A term for each element of a stretch."""
+        parts, element, n = self.parts, self.parts.element, self.parts.element.order + 1
+        line, cuts = parts.scene.center_lines[piece.member], parts.mesh.cuts[piece.member]
+        first = parts.beams.first[piece.member]
+        a, b = (parts.mesh.cut_at(piece.member, at) for at in (piece.start, piece.end))
+        spans = np.diff(cuts[a : b + 1])
+        x = (cuts[a:b, None] + spans[:, None] * element.points).ravel()
+        middle = np.repeat(cuts[a:b] + 0.5 * spans, n)
+        forward, arm = tangent(piece.way, line, x, middle)
+        weight = np.tile(element.weights, b - a)
+        length = np.repeat(line.length / parts.scales.length * spans, n) * weight
+        forward = numbers(forward[:, : self.axes] * length[:, None]).reshape(b - a, n, self.axes)
+        arm = numbers(arm[:, : self.axes] * (weight[:, None] / parts.scales.length)).reshape(b - a, n, self.axes)
+        rest = np.linalg.norm(forward, axis=2).sum(axis=1)
+        kind = Routed(element.space, self.given, element)
+        for i in range(b - a):
+            data = np.concatenate([forward[i].ravel(), arm[i].ravel(), rest[i : i + 1], np.zeros(1)])
+            turns = tuple(parts.rotations.turns[first + a + i].tolist())
+            yield One(kind, self.name, "", numbers(data), turns, (), self._row, element=first + a + i)
+
+
+def _length(piece: Stretch, line: Any) -> Any:
+    """Length of a stretch along a rigid member, m."""
+    cuts = np.linspace(piece.start, piece.end, PARTS + 1)
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    spans, middle = np.diff(cuts), 0.5 * (cuts[1:] + cuts[:-1])
+    x = (middle[:, None] + 0.5 * spans[:, None] * nodes).ravel()
+    forward, _ = tangent(piece.way, line, x, np.repeat(middle, len(nodes)))
+    return (np.linalg.norm(forward, axis=1) * (0.5 * spans[:, None] * weights).ravel()).sum() * line.length
+
+
+PARTS = 16
+"""Parts of a rigid member over which the length of a way along it is integrated."""

@@ -1,0 +1,540 @@
+"""Tendons and chambers: closed forms, shooting, published robots, energies, and every analysis."""
+
+import re
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import root
+from test_codegen import built, needs_compiler, said
+
+import sfetcas
+from sfetcas import Scene, SceneError
+from sfetcas.mathematics import quaternion
+from sfetcas.solvers.globalised import Code
+
+EI, T, D = 2.0, 3.0, 0.1
+"""Bending stiffness, N m2, tension, N, and offset, m, of a rod of one metre."""
+
+DIMENSIONS = pytest.mark.parametrize("dimension", ["plane", "space"])
+
+
+def rod(way=None, dimension="auto", *, tendons=None, analysis=None, **pull):
+    """A straight rod of one metre with one tendon, by default parallel to it."""
+    way = [{"member": "m", "offset": D}] if way is None else way
+    return Scene.from_dict(
+        {
+            "dimension": dimension,
+            "sections": {"s": {"EI3": EI, "EI2": EI, "GJ": 1.5, "rhoA": 1.0, "rhoI": [0.002, 0.001, 0.001]}},
+            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+            "tendons": {"t": {"way": way, **(pull or {"tension": T})}} if tendons is None else tendons,
+            "analysis": analysis or {},
+        }
+    )
+
+
+def arc(curvature):
+    """End of a rod bent to a circle."""
+    return np.array([np.sin(curvature), 1.0 - np.cos(curvature), 0.0]) / curvature
+
+
+def bent(step, member, x, h=1e-4):
+    """Curvature (n, 3) about the axes of the sections from differences of the rotations alone."""
+    line = step.model.scene.center_lines[member]
+    low, high = (step.along(member, x + s * h)["quaternion"] for s in (-1.0, 1.0))
+    here = step.along(member, x)["quaternion"]
+    slope = (high - low) / (2.0 * h * line.length)
+    spin = 2.0 * quaternion.multiply(quaternion.conjugate(here), slope)[:, 1:]
+    return line.curvatures(x) + quaternion.rotate(quaternion.conjugate(line.quaternions(x)), spin)
+
+
+# -- a tendon parallel to a rod ----------------------------------------------------------------------
+
+
+@DIMENSIONS
+@pytest.mark.parametrize("solver", ["ipopt", "newton"])
+@pytest.mark.parametrize(
+    "pull",
+    [
+        {"tension": T},
+        {"pull": T * D**2 / EI},
+        {"length": 1.0 - T * D**2 / EI},
+        {"pull": T * D**2 / EI + T / 600.0, "stiffness": 600.0},
+    ],
+    ids=["tension", "pull", "length", "stiffness"],
+)
+def test_circle(dimension, solver, pull):
+    """The rod is a circle of the curvature T d / EI, and the tendon an arc inside it."""
+    step = sfetcas.solve(rod(dimension=dimension, **pull), solver=solver, accuracy=1e-9).last
+    curvature = T * D / EI
+    np.testing.assert_allclose(step.position("B"), arc(curvature), atol=1e-9)
+    found = step.tendon("t")
+    assert found["tension"] == pytest.approx(T, abs=1e-9)
+    assert found["length"] == pytest.approx(1.0 - D * curvature, abs=1e-12)
+    assert found.get("slack", False) is False
+    along = step.along("m", [0.0, 0.4, 1.0])
+    np.testing.assert_allclose(along["moment"][:, 2], EI * curvature, atol=1e-9)
+    np.testing.assert_allclose(along["curvature"][:, 2], curvature, atol=1e-9)
+    # The section is pressed by the tension, and no support is needed for what pulls on itself.
+    np.testing.assert_allclose(along["force"][1], -T * np.array([np.cos(0.06), np.sin(0.06), 0.0]), atol=1e-9)
+    np.testing.assert_allclose(step.reaction("A"), 0.0, atol=1e-9)
+    assert step.certificate.stable
+
+
+def test_chamber():
+    """A chamber bends to the other side, as a tendon that pushes."""
+    step = sfetcas.solve(rod(pressure=3e5, area=1e-5), accuracy=1e-9).last
+    np.testing.assert_allclose(step.position("B"), arc(T * D / EI) * [1, -1, 1], atol=1e-9)
+    assert step.tendon("t")["tension"] == pytest.approx(-T)
+
+
+@pytest.mark.parametrize("pull", [{"pull": -0.02}, {"pull": -0.02, "stiffness": 600.0}])
+def test_slack(pull):
+    """A tendon let out is slack, unless it pushes."""
+    step = sfetcas.solve(rod(**pull)).last
+    assert step.tendon("t") == {"tension": 0.0, "length": pytest.approx(1.0), "slack": True}
+    np.testing.assert_allclose(step.position("B"), [1, 0, 0], atol=1e-12)
+    step = sfetcas.solve(rod(pushes=True, **pull)).last
+    assert step.tendon("t")["tension"] < 0.0
+    assert "slack" not in step.tendon("t")
+    assert step.position("B")[1] < -0.05
+
+
+def test_antagonists():
+    """Of two tendons of constant length the one that a load bends the rod towards is slack, the other one holds."""
+    tendons = {name: {"way": [{"member": "m", "offset": y}], "pull": 0.0} for name, y in (("up", D), ("down", -D))}
+    load = {"type": "moment", "node": "B", "value": 0.1}
+    scene = Scene.from_dict({**rod(tendons=tendons).to_dict(), "loads": {"load": load}})
+    step = sfetcas.solve(scene, accuracy=1e-9).last
+    assert step.tendon("up") == {"tension": 0.0, "length": pytest.approx(1.0), "slack": True}
+    assert step.tendon("down")["tension"] == pytest.approx(1.0)
+    np.testing.assert_allclose(step.position("B"), [1, 0, 0], atol=1e-9)
+
+
+def test_factor_and_history():
+    """Tension and shortening grow with the factor of the loads, or with a history instead."""
+    steps = {"steps": [0.5, 2.0]}
+    for pull in ({"tension": T}, {"pull": T * D**2 / EI}):
+        for step in sfetcas.solve(rod(analysis=steps, **pull), accuracy=1e-8).steps:
+            np.testing.assert_allclose(step.position("B"), arc(step.factor * T * D / EI), atol=1e-8)
+        history = {"h": {"t": [0, 2], "value": [0, 1]}}
+        scene = rod(analysis=steps, **pull).replace({"histories": history, "tendons.t.history": "h"})
+        for step in sfetcas.solve(scene, accuracy=1e-8).steps:
+            np.testing.assert_allclose(step.position("B"), arc(0.5 * step.factor * T * D / EI), atol=1e-8)
+
+
+# -- other ways ----------------------------------------------------------------------------------------
+
+
+def test_bowstring():
+    """A string between arms at both ends: what bends the rod is its force times its distance from the section."""
+    way = [{"ground": [-0.1, 0.2]}, {"node": "A", "offset": [0, D]}, {"node": "B", "offset": [0, D]}]
+    step = sfetcas.solve(rod(way), accuracy=1e-9).last
+    turned = np.array(
+        [[np.cos(step.angle("B")), -np.sin(step.angle("B"))], [np.sin(step.angle("B")), np.cos(step.angle("B"))]]
+    )
+    ends = np.array([[0.0, D], step.position("B")[:2] + turned @ [0.0, D]])
+    pull = T * (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    x = np.linspace(0.0, 1.0, 5)
+    along = step.along("m", x)
+    arms = ends[0] - along["position"][:, :2]
+    np.testing.assert_allclose(along["moment"][:, 2], arms[:, 1] * pull[0] - arms[:, 0] * pull[1], atol=1e-8)
+    np.testing.assert_allclose(along["force"][:, :2], np.tile(-pull, (5, 1)), atol=1e-8)
+    first = np.hypot(0.1, 0.1)
+    assert step.tendon("t")["length"] == pytest.approx(first + np.linalg.norm(ends[1] - ends[0]), abs=1e-9)
+
+
+def shot(way, tension, stiffness):
+    """Positions of the end of a rod with a tendon, by shooting for the moment at the clamp, and no finite element.
+
+    ``way`` gives offset and its derivative in the axes of the section at s; the tendon ends at the tip.  What goes
+    through a cut, tendon and section together, is nothing: the moment of the section is minus that of the tendon.
+    """
+
+    def curvature(s):
+        offset, slope = way(s)
+
+        def missing(k):
+            along = np.array([1.0, 0.0, 0.0]) + np.cross(k, offset) + slope
+            return stiffness * k + np.cross(offset, tension * along / np.linalg.norm(along))
+
+        return root(missing, np.zeros(3), tol=1e-14).x
+
+    def rate(s, state):
+        q, k = state[3:], curvature(s)
+        spin = 0.5 * quaternion.multiply(q, np.array([0.0, *k]))
+        return np.concatenate([quaternion.rotate(q, np.array([1.0, 0.0, 0.0])), spin])
+
+    found = solve_ivp(rate, (0.0, 1.0), [0, 0, 0, 1, 0, 0, 0], rtol=1e-12, atol=1e-13, method="DOP853")
+    return found.y[:3, -1]
+
+
+def test_helix():
+    """A tendon wound around a rod bends and twists it to what the differential equations say."""
+    way = [{"member": "m", "helix": {"radius": 0.05, "turns": 1.5, "phase": 0.3}}]
+    step = sfetcas.solve(rod(way, tension=12.0), accuracy=1e-10).last
+    rate = 3.0 * np.pi
+
+    def wound(s):
+        angle = 0.3 + rate * s
+        across = 0.05 * np.array([0.0, np.cos(angle), np.sin(angle)])
+        return across, 0.05 * rate * np.array([0.0, -np.sin(angle), np.cos(angle)])
+
+    exact = shot(wound, 12.0, np.array([1.5, EI, EI]))
+    np.testing.assert_allclose(step.position("B"), exact, atol=1e-9)
+    assert abs(exact[2]) > 0.01
+
+
+def test_varying_offset():
+    """Offsets that vary along the member, of both kinds, in space and in the plane."""
+    profile = [0.1, -0.15, 0.08]
+    way = [{"member": "m", "offset": {"polynomial": profile}}]
+    exact = shot(
+        lambda s: (
+            np.array([0.0, np.polyval(profile[::-1], s), 0.0]),
+            np.array([0.0, -0.15 + 0.16 * s, 0.0]),
+        ),
+        T,
+        np.array([1.5, EI, EI]),
+    )
+    for dimension in ("plane", "space"):
+        step = sfetcas.solve(rod(way, dimension), accuracy=1e-10).last
+        np.testing.assert_allclose(step.position("B"), exact, atol=1e-9)
+    linear = {"at": [0, 0.3, 1], "value": [0.1, 0.05, 0.05]}
+    step = sfetcas.solve(rod([{"member": "m", "offset": [linear, 0.0]}]), accuracy=1e-9).last
+    parts = [{"member": "m", "offset": {"polynomial": [0.1, -0.05 / 0.3]}, "span": [0, 0.3]}]
+    other = sfetcas.solve(rod([*parts, {"member": "m", "offset": 0.05, "span": [0.3, 1]}]), accuracy=1e-9).last
+    np.testing.assert_allclose(step.position("B"), other.position("B"), atol=1e-9)
+
+
+def test_direction_and_parts():
+    """Ways backwards, and in parts one after the other, are the same."""
+    one = sfetcas.solve(rod(), accuracy=1e-9).last.position("B")
+    for way in (
+        [{"member": "m", "offset": D, "span": [1, 0]}],
+        [{"member": "m", "offset": D, "span": [0, 0.37]}, {"member": "m", "offset": D, "span": [0.37, 1]}],
+        [{"member": "m", "offset": [D, 0]}],
+    ):
+        np.testing.assert_allclose(sfetcas.solve(rod(way), accuracy=1e-9).last.position("B"), one, atol=1e-9)
+
+
+def test_part_of_a_member():
+    """Beyond the place where a tendon ends the rod is straight."""
+    step = sfetcas.solve(rod([{"member": "m", "offset": D, "span": [0, 0.5]}]), accuracy=1e-9).last
+    along = step.along("m", [0.25, 0.75])
+    np.testing.assert_allclose(along["moment"][:, 2], [T * D, 0.0], atol=1e-9)
+    np.testing.assert_allclose(along["force"][1], 0.0, atol=1e-9)
+    assert step.angle("B") == pytest.approx(0.5 * T * D / EI)
+
+
+# -- a robot with two segments -------------------------------------------------------------------------
+
+OFFSETS = {
+    angle: (0.01 * np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])).tolist() for angle in (90, -30)
+}
+
+
+def robot(discs, tensions=(4.0, 2.0), members=("one", "two"), analysis=None):
+    """The robot of Rao, Peyron, Lilge and Burgner-Kahrs 2021, section 4, without stretch and shear."""
+    more = {"discs": 10} if discs else {}
+    segment = {"section": "s", "b2": [1, 0, 0]}
+    ways = {
+        "a": [{"member": "one", "offset": OFFSETS[90], **more}],
+        "b": [{"member": name, "offset": OFFSETS[-30], **more} for name in members],
+    }
+    return Scene.from_dict(
+        {
+            "sections": {"s": {"shape": "circle", "radius": 0.7e-3, "E": 54e9, "nu": 0.3}},
+            "nodes": {
+                "base": {"position": [0, 0, 0], "support": "clamped"},
+                "middle": {"position": [0, 0, 0.2]},
+                "tip": {"position": [0, 0, 0.4]},
+            },
+            "members": {
+                "one": {"nodes": ["base", "middle"], **segment},
+                "two": {"nodes": ["middle", "tip"], **segment},
+            },
+            "tendons": {
+                name: {"way": way, "tension": t} for (name, way), t in zip(ways.items(), tensions, strict=True)
+            },
+            "analysis": analysis or {},
+        }
+    )
+
+
+ROBOT = {False: (0.1276122480, 0.1434736023, 0.3364237920), True: (0.1293873757, 0.1460646440, 0.3341542370)}
+"""Tips with both tendons, m: the same differential equations solved by collocation, to ten digits."""
+
+SINGLE = {
+    (False, 4.0, 0.0): (0.0, 0.2160533, 0.3214331),
+    (True, 4.0, 0.0): (0.0, 0.2182687, 0.3195510),
+    (False, 0.0, 2.0): (0.1292144, -0.0746020, 0.3600957),
+    (True, 0.0, 2.0): (0.1299549, -0.0750295, 0.3595993),
+}
+"""Tips of the source with stretch and shear, which are 1e-5 of the length here."""
+
+
+@pytest.mark.parametrize("discs", [False, True], ids=["along", "discs"])
+def test_robot(discs):
+    step = sfetcas.solve(robot(discs), accuracy=1e-9).last
+    # The last digit of the reference is rounded.
+    np.testing.assert_allclose(step.position("tip"), ROBOT[discs], atol=1e-10)
+    assert step.certificate.stable
+
+
+@pytest.mark.parametrize("case", SINGLE)
+def test_robot_of_the_source(case):
+    """One tendon pulled, against the published tips."""
+    discs, *tensions = case
+    step = sfetcas.solve(robot(discs, tensions), accuracy=1e-7).last
+    np.testing.assert_allclose(step.position("tip"), SINGLE[case], atol=2e-5)
+
+
+@pytest.mark.parametrize("discs", [False, True], ids=["along", "discs"])
+def test_section_moments(discs):
+    """What is told along a member is what its sections carry: stiffness times the curvature that its rotations have."""
+    step = sfetcas.solve(robot(discs), accuracy=1e-9).last
+    x = np.linspace(0.03, 0.93, 9)
+    found = step.along("one", x)["curvature"]
+    # Rounding of the differences: 1e-16 over steps of 2e-5 m.
+    np.testing.assert_allclose(found, bent(step, "one", x), atol=1e-6 * np.abs(found).max())
+    assert step.along("one", [0.5])["force"][0] @ step.along("one", [0.5])["force"][0] > 4.0**2
+    np.testing.assert_allclose(step.reaction("base"), 0.0, atol=1e-12)
+
+
+@DIMENSIONS
+def test_discs_tend_to_the_way_along(dimension):
+    """More discs are nearer to the way along the member, with the square of their number."""
+    exact = sfetcas.solve(rod(dimension=dimension), accuracy=1e-10).last.position("B")
+    missed = []
+    for discs in (4, 8):
+        way = [{"member": "m", "offset": D, "discs": discs}]
+        missed.append(np.linalg.norm(sfetcas.solve(rod(way, dimension), accuracy=1e-10).last.position("B") - exact))
+    assert np.log2(missed[0] / missed[1]) == pytest.approx(2.0, abs=0.05)
+
+
+# -- every analysis ------------------------------------------------------------------------------------
+
+
+PULLS = {
+    "tension": {"tension": T},
+    "pull": {"pull": T * D**2 / EI, "pushes": True},
+    "stiffness": {"pull": T * D**2 / EI + T / 600.0, "stiffness": 600.0},
+}
+"""The same circle by each of the ways to pull."""
+
+KINDS = pytest.mark.parametrize("pull", PULLS.values(), ids=PULLS)
+
+
+@KINDS
+@DIMENSIONS
+def test_path(dimension, pull):
+    path = sfetcas.solve(rod(dimension=dimension, analysis={"type": "path", "range": [0, 3], "steps": [2.0]}, **pull))
+    for factor, place in zip(path.main.factors, path.positions("B"), strict=True):
+        np.testing.assert_allclose(place, arc(factor * T * D / EI) if factor else [1, 0, 0], atol=1e-4)
+
+
+def test_buckling():
+    """A string in the axis of a column does not buckle it; one between its ends does, at pi^2 EI: both ends swing."""
+    along = rod([{"member": "m", "offset": 0.0}], "plane", tension=100.0)
+    smallest = [sfetcas.solve(along.replace({"tendons.t.tension": t})).last.certificate.smallest for t in (100.0, 1e-3)]
+    assert smallest[0] == pytest.approx(smallest[1], rel=1e-6)
+    for tension, stable in ((0.99 * np.pi**2 * EI, True), (1.01 * np.pi**2 * EI, False)):
+        scene = rod([{"node": "A"}, {"node": "B"}], "plane", tension=tension, analysis={"unstable": "stay"})
+        assert sfetcas.solve(scene).last.certificate.stable is stable
+
+
+@KINDS
+def test_modes(pull):
+    """Frequencies about the circle, plane against space; with a given length the stiff tendon raises the first one."""
+    analysis = {"type": "modes", "modes": 2}
+    plane = sfetcas.solve(rod(dimension="plane", analysis=analysis, **pull))
+    space = sfetcas.solve(rod(dimension="space", analysis={"type": "modes", "modes": 6}, **pull))
+    for omega in plane.omega:
+        assert np.abs(np.array(space.omega) / omega - 1.0).min() < 1e-6
+    free = sfetcas.solve(rod(dimension="plane", analysis=analysis, tension=T)).omega[0]
+    assert plane.omega[0] >= free * (1.0 - 1e-9)
+
+
+@pytest.mark.parametrize("pull", [{"tension": T}, {"pull": 0.0, "stiffness": 50.0}], ids=["tension", "stiffness"])
+def test_motion(pull):
+    """Let go from rest, a rod keeps the sum of its energies, to which the tendon belongs, by either integrator.
+
+    Radau damps the waves of the jump at the begin, which the energy-momentum scheme keeps.
+    """
+    more = {} if "tension" in pull else {"loads": {"p": {"type": "moment", "node": "B", "value": 0.3}}}
+    analysis = {"type": "dynamic", "end": 0.5, "accuracy": 1e-4, "output": 0.1}
+    places = []
+    for integrator, lost in (("radau-3", 5e-2), ("conserving", 5e-3)):
+        scene = rod(dimension="plane", analysis={**analysis, "integrator": integrator}, **pull)
+        motion = sfetcas.solve(Scene.from_dict({**scene.to_dict(), **more}))
+        energies = [step.energy for step in motion.steps]
+        largest = max(energy["kinetic"] for energy in energies)
+        assert largest > 0.01
+        np.testing.assert_allclose([energy["total"] for energy in energies], 0.0, atol=lost * largest)
+        places.append(np.array([step.position("B") for step in motion.steps]))
+        assert motion.steps[-1].tendon("t")["length"] != pytest.approx(1.0, abs=1e-4)
+    np.testing.assert_allclose(*places, atol=2e-3)
+
+
+@pytest.mark.parametrize("pull", [{"tension": T}, {"pull": 0.01, "pushes": True}, {"pull": 0.05, "stiffness": 50.0}])
+def test_motion_of_a_pull(pull):
+    """Pulled slowly, against statics: at the end it is at rest but for what the begin left."""
+    history = {"h": {"t": [0, 6], "polynomial": [[0, 0, 0, 10, -15, 6]]}}
+    analysis = {"type": "dynamic", "end": 6.0, "accuracy": 1e-4, "output": 6.0}
+    scene = rod(dimension="plane", analysis=analysis, **pull).replace({"histories": history, "tendons.t.history": "h"})
+    moved = sfetcas.solve(scene).steps[-1]
+    still = sfetcas.solve(rod(dimension="plane", **pull)).last
+    np.testing.assert_allclose(moved.position("B"), still.position("B"), atol=2e-3)
+    assert moved.tendon("t")["tension"] == pytest.approx(still.tendon("t")["tension"], rel=5e-2)
+
+
+@KINDS
+@DIMENSIONS
+def test_parameters(dimension, pull):
+    """Answers and their derivatives by what pulls, against the circle."""
+    name = "tendons.t.tension" if "tension" in pull else "tendons.t.pull"
+    asked = [
+        "nodes.B.position",
+        "tendons.t.tension",
+        "tendons.t.length",
+        "members.m.moment at 0.3",
+        "members.m.force at 0.3",
+    ]
+    family = sfetcas.parametric(rod(dimension=dimension, analysis={"accuracy": 1e-8}, **pull), [name], asked)
+    (value,) = (v for k, v in pull.items() if k in name)
+    answer = family.solve({name: 1.5 * value})
+    curvature = 1.5 * T * D / EI
+    np.testing.assert_allclose(np.ravel(answer["nodes.B.position"]), arc(curvature), atol=1e-8)
+    assert answer["tendons.t.tension"] == pytest.approx(1.5 * T)
+    assert answer["tendons.t.length"] == pytest.approx(1.0 - D * curvature)
+    np.testing.assert_allclose(np.ravel(answer["members.m.moment at 0.3"])[2], EI * curvature, atol=1e-7)
+    force = -1.5 * T * np.array([np.cos(0.3 * curvature), np.sin(0.3 * curvature), 0.0])
+    np.testing.assert_allclose(np.ravel(answer["members.m.force at 0.3"]), force, atol=1e-6)
+    slope = answer.jacobian["tendons.t.tension"][name].item()
+    assert slope == pytest.approx(T / value, rel=1e-6)
+
+
+def test_offset_as_parameter():
+    """Where a tendon lies is a number of the scene as any other."""
+    family = sfetcas.parametric(rod(analysis={"accuracy": 1e-8}), ["tendons.t.way.0.offset.0"], ["nodes.B.position"])
+    answer = family.solve({"tendons.t.way.0.offset.0": 0.12})
+    np.testing.assert_allclose(np.ravel(answer["nodes.B.position"]), arc(T * 0.12 / EI), atol=1e-8)
+
+
+def test_parameters_of_the_robot():
+    """The same answers by statics and by parametric solvers, in space, through discs and along the members."""
+    for discs in (False, True):
+        scene = robot(discs, analysis={"accuracy": 1e-8})
+        asked = [
+            "nodes.tip.position",
+            "members.one.moment at 0.31",
+            "members.one.force at 0.31",
+            "members.one.curvature at 0.31",
+        ]
+        answer = sfetcas.parametric(scene, ["tendons.a.tension"], asked).solve({})
+        step = sfetcas.solve(scene).last
+        np.testing.assert_allclose(np.ravel(answer["nodes.tip.position"]), step.position("tip"), atol=1e-9)
+        for key in ("moment", "force", "curvature"):
+            told = step.along("one", [0.31])[key][0]
+            np.testing.assert_allclose(np.ravel(answer[f"members.one.{key} at 0.31"]), told, rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["tension", "pull"])
+def test_design(name):
+    """What turns the end by half a radian."""
+    found = sfetcas.find(rod(**PULLS[name]), {f"tendons.t.{name}": (1e-3, 20.0)}, {"nodes.B.angle": 0.5})
+    exact = {"tension": 0.5 * EI / D, "pull": 0.5 * D}[name]
+    assert found.values[f"tendons.t.{name}"] == pytest.approx(exact, rel=1e-5)
+
+
+def test_optimal_control():
+    """A tendon swings a rigid bar about a hinge, with the work that the bar gets."""
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
+            "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s", "type": "rigid"}},
+            "tendons": {"t": {"way": [{"ground": [0, 0.5]}, {"member": "m", "discs": [0.6]}], "tension": 1.0}},
+            "analysis": {"type": "dynamic", "end": 1.0},
+        }
+    )
+    problem = sfetcas.OptimalControl(scene, {"tendons.t.tension": (0, 9)}, time=1.0, intervals=10)
+    problem.minimise(problem.integral(problem.control("tendons.t.tension") ** 2))
+    problem.subject_to(problem.at_tf(problem.answer("nodes.B.angle")) == 0.5, name="turned")
+    found = problem.solve(replay=False)
+    angle = found.answer("nodes.B.angle").ravel()
+    length = np.hypot(0.6 * np.cos(angle), 0.6 * np.sin(angle) - 0.5)
+    pull = found.control("tendons.t.tension").ravel()
+    work = -np.sum(pull * np.diff(np.interp(np.linspace(0, 1, len(pull) + 1), found.times, length)))
+    speed = np.gradient(angle, found.times)[-1]
+    assert work == pytest.approx(0.5 * speed**2 / 3.0, rel=5e-2)
+
+
+@needs_compiler
+@pytest.mark.parametrize("discs", [False, True], ids=["along", "discs"])
+def test_exported_code(tmp_path, discs):
+    """The program in C agrees with the process of the same functions."""
+    scene = robot(discs, analysis={"accuracy": 1e-4})
+    solver = sfetcas.export(
+        scene, tmp_path / "c", name="c", arguments=["tendons.a.tension"], results=["nodes.tip.position"]
+    )
+    outcome, results = solver.solve([4.0])
+    assert outcome.code is Code.SOLVED
+    np.testing.assert_allclose(results, ROBOT[discs], atol=1e-4)
+    words = said(built(tmp_path / "c", "c"))
+    assert re.match(r"(\d+) of \1 cases agree, \1 of them to the last bit", words), words
+
+
+# -- what is refused -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("pull", "words"),
+    [
+        ({"way": [{"node": "C"}, {"node": "B"}], "tension": 1.0}, "tendons.t.way.0.node: found 'C', accepted: A, B"),
+        ({"way": [{"member": "n"}], "tension": 1.0}, "tendons.t.way.0.member: found 'n', accepted: m"),
+        ({"way": [{"node": "A"}], "tension": 1.0}, "tendons.t.way: found 1 place"),
+        ({"way": [], "tension": 1.0}, "tendons.t.way: found 0 place"),
+        ({"way": [{"node": "A"}, {"ground": [0, 0]}], "tension": 1.0}, "piece without length at"),
+        ({"way": [{"member": "m"}], "tension": -1.0}, "tendons.t.tension: found -1.0, accepted: zero or"),
+        (
+            {"way": [{"member": "m"}], "pressure": -1.0, "area": 1.0},
+            "tendons.t.pressure: found -1.0, accepted: zero or",
+        ),
+        ({"way": [{"member": "m"}], "pressure": 1.0}, "'pressure' and 'area' together"),
+        ({"way": [{"member": "m"}], "tension": 1.0, "pull": 0.1}, "found 'tension' and 'pull', accepted: one of"),
+        ({"way": [{"member": "m"}]}, "tendons.t: accepted: one of 'tension'"),
+        ({"way": [{"member": "m"}], "tension": 1.0, "stiffness": 2.0}, "tendons.t.stiffness: found with a tension"),
+        ({"way": [{"member": "m", "node": "A"}], "tension": 1.0}, "way.0: found node and member, accepted: one of"),
+        ({"way": [{"member": "m", "span": [0, 2]}], "tension": 1.0}, "way.0.span: found"),
+        ({"way": [{"member": "m", "discs": 0}], "tension": 1.0}, "way.0.discs: found 0, accepted: a number of discs"),
+        ({"way": [{"member": "m", "offset": [1, 2, 3]}], "tension": 1.0}, "way.0.offset: found three numbers"),
+        ({"way": [{"node": "A", "discs": 3}], "tension": 1.0}, "way.0.discs: not accepted with a node"),
+        ({"way": [{"member": "m"}], "tension": 1.0, "history": "h"}, "tendons.t.history: found 'h'"),
+    ],
+)
+def test_refused(pull, words):
+    with pytest.raises(SceneError, match=re.escape(words)):
+        rod(tendons={"t": pull})
+
+
+def test_pulled_too_far():
+    """A shortening that no shape has is said to be impossible."""
+    with pytest.raises(sfetcas.SolveError, match=r"no shape .* tendons\.t"):
+        sfetcas.solve(rod(pull=5.0))
+
+
+@pytest.mark.parametrize("kind", ["path", "modes", "dynamic"])
+def test_slackness_is_searched_in_statics_only(kind):
+    analysis = {"type": kind, **({"end": 1.0} if kind == "dynamic" else {"range": [0, 1]} if kind == "path" else {})}
+    with pytest.raises(SceneError, match=f"tendons.t: found a length that is given with the analysis '{kind}'"):
+        rod(pull=0.01, analysis=analysis)
+    with pytest.raises(SceneError, match=r"tendons\.t: whether a tendon is slack is found by a search"):
+        sfetcas.parametric(rod(pull=0.01), ["tendons.t.pull"], ["nodes.B.position"])
+
+
+def test_not_with_contacts():
+    with pytest.raises(SceneError, match="contacts: found with"):
+        rod().replace(contacts={"c": {"type": "plane", "point": [0, -1], "normal": [0, 1], "member": "m"}})
