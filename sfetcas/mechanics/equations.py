@@ -391,7 +391,8 @@ class Equations:
         found = self._evaluated(state, acting).groups
         pairs = zip(found, self.model.terms, strict=True)
         shares = [np.zeros_like(part[3]) if group.kind.is_load else part[3].copy() for part, group in pairs]
-        shares[0] -= acting.torque.reshape(shares[0].shape)
+        couples = acting.torque.reshape(len(acting.torque), -1)
+        shares[0][:, : couples.shape[1]] -= couples
         return shares
 
     @functools.cached_property
