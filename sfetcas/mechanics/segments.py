@@ -15,7 +15,7 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..description.structure import SLIDING
-from ..description.tendons import Piece, holes_along, pieces_of
+from ..description.tendons import holes_along
 from ..mathematics.arrays import Array, Index
 from .mesh import Mesh
 from .rotations import end_joints
@@ -111,22 +111,16 @@ def _retained_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
     if any(load.type == "distributed" for load in following):
         return list(inner)
     wanted = {int(np.argmin(np.abs(cuts - (load.at or 0.0)))) for load in following}
-    for pieces in pieces_of_tendons(scene):
+    for pieces in scene.tendon_pieces.values():
         wanted |= {int(np.argmin(np.abs(cuts - at))) for at in holes_along(pieces, member)}
     return [cut for cut in inner if cut in wanted]
-
-
-def pieces_of_tendons(scene: Scene) -> Iterator[list[Piece]]:
-    """The pieces of the way of each tendon."""
-    for tendon in scene.tendons.values():
-        yield pieces_of(tendon, scene.nodes, scene.members, scene.center_lines)
 
 
 def _sprung(scene: Scene) -> Iterator[str]:
     """Nodes whose displacement springs, tendons and small members act upon, and first nodes of what follows its
     section.
     """
-    for pieces in pieces_of_tendons(scene):
+    for pieces in scene.tendon_pieces.values():
         for hole in (hole for piece in pieces if isinstance(piece, tuple) for hole in piece):
             yield from [hole.node] if hole.node is not None else []
             yield from scene.members[hole.member].nodes if hole.member is not None else ()
