@@ -383,8 +383,9 @@ def test_motion_of_a_pull(pull):
     """Pulled slowly, against statics: at the end it is at rest but for what the begin left."""
     history = {"h": {"t": [0, 6], "polynomial": [[0, 0, 0, 10, -15, 6]]}}
     analysis = {"type": "dynamic", "end": 6.0, "accuracy": 1e-4, "output": 6.0}
-    scene = rod(dimension="plane", analysis=analysis, **pull).replace({"histories": history, "tendons.t.history": "h"})
-    moved = sfetcas.solve(scene).steps[-1]
+    scene = {**rod(dimension="plane", history=None, **pull).to_dict(), "histories": history, "analysis": analysis}
+    scene["tendons"]["t"]["history"] = "h"
+    moved = sfetcas.solve(Scene.from_dict(scene)).steps[-1]
     still = sfetcas.solve(rod(dimension="plane", **pull)).last
     np.testing.assert_allclose(moved.position("B"), still.position("B"), atol=2e-3)
     assert moved.tendon("t")["tension"] == pytest.approx(still.tendon("t")["tension"], rel=5e-2)
@@ -533,6 +534,12 @@ def test_slackness_is_searched_in_statics_only(kind):
         rod(pull=0.01, analysis=analysis)
     with pytest.raises(SceneError, match=r"tendons\.t: whether a tendon is slack is found by a search"):
         sfetcas.parametric(rod(pull=0.01), ["tendons.t.pull"], ["nodes.B.position"])
+
+
+def test_a_pull_does_not_jump():
+    """A motion cannot follow a length that jumps."""
+    with pytest.raises(SceneError, match=r"tendons\.t: the key 'history' is missing"):
+        rod(pull=0.01, pushes=True, analysis={"type": "dynamic", "end": 1.0})
 
 
 def test_not_with_contacts():

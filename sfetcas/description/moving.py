@@ -13,6 +13,7 @@ from .sections import CrossSection, Polynomial, Table
 from .springs import Spring
 from .structure import Member, Node
 from .task import Analysis
+from .tendons import Tendon
 
 __all__ = ["check_beginning", "check_driving", "check_masses", "check_no_contact", "check_velocities"]
 
@@ -130,13 +131,14 @@ def check_driving(
     members: Mapping[str, Member],
     motions: Mapping[str, Motion],
     histories: Mapping[str, History],
+    tendons: Mapping[str, Tendon],
 ) -> None:
-    """Refuse motions whose place or velocity would jump in time, which takes a force without bound.
+    """Refuse motions and tendons whose place or velocity would jump in time, which takes a force without bound.
 
     Raises
     ------
     SceneError
-        Names the history and the motion, the time and the size of the jump.
+        Names the history and the motion or tendon, the time and the size of the jump.
     """
     resting = not any(any(node.velocity or ()) for node in nodes.values()) and not any(map(_spins, members.values()))
     for name, motion in motions.items():
@@ -154,15 +156,26 @@ def check_driving(
             _check_course(name, history, analysis.duration)
         except SceneError as error:
             raise error.within(*where) from None
+    for name, tendon in tendons.items():
+        if not tendon.measured or tendon.stiffness is not None or not (tendon.pull or tendon.length):
+            continue
+        if tendon.history is None:
+            _check_constant(name, analysis, "tendons")
+            continue
+        try:
+            _check_start(name, histories[tendon.history], analysis, resting)
+            _check_course(name, histories[tendon.history], analysis.duration)
+        except SceneError as error:
+            raise error.within("histories", tendon.history) from None
 
 
-def _check_constant(motion: str, analysis: Analysis) -> None:
+def _check_constant(motion: str, analysis: Analysis, table: str = "motions") -> None:
     if analysis.initial == "undeformed":
         message = (
             "the key 'history' is missing: without one the motion would jump at t = 0, accepted: a history that begins "
             "with 0, or initial = 'equilibrium'"
         )
-        raise SceneError(message, ("motions", motion))
+        raise SceneError(message, (table, motion))
 
 
 def _check_start(motion: str, history: History, analysis: Analysis, resting: bool) -> None:

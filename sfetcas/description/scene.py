@@ -33,7 +33,7 @@ from .springs import Spring
 from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
 from .task import Analysis, Expect, Until
-from .tendons import Tendon, Way, check_tendon
+from .tendons import Piece, Tendon, Way, check_pieces, check_way, pieces_of
 
 __all__ = [
     "Actuation",
@@ -240,6 +240,12 @@ class Scene(Record):
             lines[name] = place(member.shape, start, end, member.b2, ("members", name))
         return MappingProxyType(lines)
 
+    @cached_property
+    def tendon_pieces(self) -> Mapping[str, tuple[Piece, ...]]:
+        """The straight pieces and the stretches along members of the way of each tendon, by name."""
+        ways = {name: pieces_of(t, self.nodes, self.members, self.center_lines) for name, t in self.tendons.items()}
+        return MappingProxyType(ways)
+
     @property
     def started(self) -> bool:
         """Whether nodes have ``start`` places, which choose among equilibria."""
@@ -416,7 +422,8 @@ def _check_tendons(scene: Scene) -> None:
     for name, tendon in scene.tendons.items():
         _known(tendon.history, scene.histories, "histories", "tendons", name, "history")
         try:
-            check_tendon(tendon, scene.nodes, scene.members, scene.center_lines)
+            check_way(tendon, scene.nodes, scene.members)
+            check_pieces(scene.tendon_pieces[name], len(tendon.way), scene.center_lines)
         except SceneError as error:
             raise error.within("tendons", name) from None
         if scene.contacts:
@@ -654,7 +661,7 @@ def _check_moving(scene: Scene) -> None:
     if analysis.moves:
         check_no_contact(analysis, scene.contacts, scene.springs)
     if analysis.type == "dynamic":
-        check_driving(analysis, scene.nodes, scene.members, scene.motions, scene.histories)
+        check_driving(analysis, scene.nodes, scene.members, scene.motions, scene.histories, scene.tendons)
 
 
 def _check_contacts(scene: Scene) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any, final
@@ -27,7 +27,8 @@ __all__ = [
     "Stretch",
     "Tendon",
     "Way",
-    "check_tendon",
+    "check_pieces",
+    "check_way",
     "holes_along",
     "kinks_along",
     "offsets",
@@ -296,12 +297,13 @@ def _slope(part: Quantity, x: Array, middle: Array) -> Array:
     return np.zeros(len(x))
 
 
-def _hole_in(way: Way, line: CenterLine, at: float) -> Hole:
-    x = np.array([at])
-    frame = matrix(line.quaternions(x))[0]
-    across = offsets(way, x, x)[0][0]
-    arm = numbers(frame[:, 1] * across[0] + frame[:, 2] * across[1])
-    return Hole(None, way.member, at, numbers(line.positions(x)[0] + arm), arm)
+def _holes_in(way: Way, line: CenterLine) -> list[Hole]:
+    """The holes of a way in a member, or its ends along it."""
+    x = np.array(way.ends if way.discs is None else way.holes)
+    frames, across = matrix(line.quaternions(x)), offsets(way, x, x)[0]
+    arms = numbers(frames[:, :, 1] * across[:, :1] + frames[:, :, 2] * across[:, 1:])
+    places = numbers(line.positions(x) + arms)
+    return [Hole(None, way.member, at, places[i], arms[i]) for i, at in enumerate(x.tolist())]
 
 
 def _hole(way: Way, nodes: Mapping[str, Node]) -> Hole:
@@ -313,17 +315,12 @@ def _hole(way: Way, nodes: Mapping[str, Node]) -> Hole:
 
 def pieces_of(
     tendon: Tendon, nodes: Mapping[str, Node], members: Mapping[str, Member], lines: Mapping[str, CenterLine]
-) -> list[Piece]:
+) -> tuple[Piece, ...]:
     """The straight pieces of a way, and its stretches along members, in their order."""
     found: list[Piece] = []
     last: Hole | None = None
     for way in tendon.way:
-        if way.member is None:
-            holes = [_hole(way, nodes)]
-        elif way.discs is None:
-            holes = [_hole_in(way, lines[way.member], at) for at in way.ends]
-        else:
-            holes = [_hole_in(way, lines[way.member], at) for at in way.holes]
+        holes = [_hole(way, nodes)] if way.member is None else _holes_in(way, lines[way.member])
         if last is not None and not _same(last, holes[0], members, nodes):
             found.append((last, holes[0]))
         if way.member is not None and way.discs is None:
@@ -331,7 +328,7 @@ def pieces_of(
         else:
             found += pairwise(holes)
         last = holes[-1]
-    return found
+    return tuple(found)
 
 
 def _body(hole: Hole, members: Mapping[str, Member], nodes: Mapping[str, Node]) -> tuple[Any, ...]:
@@ -360,7 +357,7 @@ NEAR = 1e-9
 """Holes of one body nearer than this share of their distance from the centre line are one."""
 
 
-def holes_along(pieces: list[Piece], member: str) -> tuple[float, ...]:
+def holes_along(pieces: Iterable[Piece], member: str) -> tuple[float, ...]:
     """Fractions of the length of a member at which straight pieces begin or end."""
     ends = [hole for piece in pieces if isinstance(piece, tuple) for hole in piece]
     return tuple(sorted({hole.at for hole in ends if hole.member == member}))
@@ -377,10 +374,8 @@ def kinks_along(tendon: Tendon, member: str) -> Iterator[float]:
                 yield from breaks(part)
 
 
-def check_tendon(
-    tendon: Tendon, nodes: Mapping[str, Node], members: Mapping[str, Member], lines: Mapping[str, CenterLine]
-) -> None:
-    """Refuse a way through what is not there, and one without length.
+def check_way(tendon: Tendon, nodes: Mapping[str, Node], members: Mapping[str, Member]) -> None:
+    """Refuse a way through what is not there.
 
     Raises
     ------
@@ -402,9 +397,18 @@ def check_tendon(
             raise SceneError(
                 f"{message}; accepted: the end of a member, as {{member, discs = [1]}}", (*where, "offset")
             )
-    pieces = pieces_of(tendon, nodes, members, lines)
+
+
+def check_pieces(pieces: Sequence[Piece], places: int, lines: Mapping[str, CenterLine]) -> None:
+    """Refuse a way without length, of so many ``places``, and one that runs backwards.
+
+    Raises
+    ------
+    SceneError
+        Its place begins with ``way``.
+    """
     if not pieces:
-        raise SceneError(f"found {len(tendon.way)} place, accepted: a way with a length, from place to place", ("way",))
+        raise SceneError(f"found {places} place, accepted: a way with a length, from place to place", ("way",))
     size = max(line.length for line in lines.values())
     for piece in pieces:
         if isinstance(piece, tuple) and _apart(*piece) <= NEAR * size:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import tolerances
-from ..description.scene import Analysis, Load, Motion, Node, Scene
+from ..description.scene import Analysis, History, Load, Motion, Node, Scene
 from ..description.sections import evaluate
 from ..description.structure import SLIDING, released
 from ..equilibria import statics, stops
@@ -48,6 +48,9 @@ def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
     nodes = {name: node.model_copy(update={"velocity": None}) for name, node in scene.nodes.items()}
     members = {name: member.model_copy(update={"spin": None}) for name, member in scene.members.items()}
     tables: dict[str, Any] = {"loads": loads, "motions": motions, "nodes": nodes, "members": members}
+    still = {name: history.factor(0.0) for name, history in histories.items()} if scene.tendons else {}
+    # Of tendons what their histories begin with.
+    tables["histories"] = {name: History(t=(0.0, 1.0), value=(factor, factor)) for name, factor in still.items()}
     # What acts later only, or is cut, may be all that makes a scene one in space.
     tables |= {"dimension": scene.resolved_dimension, "analysis": analysis, "expect": ()}
     before = Scene(**{**_given_keys(scene), **tables})

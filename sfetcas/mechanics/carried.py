@@ -13,13 +13,14 @@ Magnitudes are added up whatever the directions, as loads may turn.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..description.loads import Load
 from ..description.scene import Scene
+from ..description.tendons import Piece, Stretch, Tendon, offsets
 from ..mathematics.arrays import Array, Index
 from ..mathematics.linear import SparseSolver
 
@@ -81,6 +82,8 @@ class _Acting:
         for magnet in scene.magnets.values():
             if magnet.node is not None:
                 self.at_nodes[self._number[magnet.node], 1] += math.hypot(*magnet.vector) * strength(magnet.node)
+        for name, tendon in scene.tendons.items():
+            self._string(name, tendon)
         if scene.gravity is not None:
             self._weigh(float(np.linalg.norm(scene.gravity)) * self._largest)
 
@@ -106,7 +109,29 @@ class _Acting:
         else:
             self.at_nodes[self._number[load.node]] += size
 
-    def _share(self, load: Load) -> float:
+    def _string(self, name: str, tendon: Tendon) -> None:
+        """What a tendon of given tension bends the members by that it runs along, and pulls at those that it joins."""
+        if tendon.measured or not tendon.force:
+            return
+        reached: dict[str, Array] = {}
+        for piece in self._scene.tendon_pieces[name]:
+            for member, apart, arm in self._strung(piece):
+                reached[member] = np.maximum(reached.get(member, 0.0), np.array([float(apart), arm]))
+        for member, size in reached.items():
+            self._add(member, abs(tendon.force) * self._share(tendon) * size)
+
+    def _strung(self, piece: Piece) -> Iterator[tuple[str, bool, float]]:
+        """Members at which a piece pulls, whether from elsewhere, and how far from the centre line it is, m."""
+        if isinstance(piece, Stretch):
+            x = np.linspace(piece.start, piece.end, 9)
+            yield piece.member, False, float(np.linalg.norm(offsets(piece.way, x, x)[0], axis=1).max())
+            return
+        for hole in piece:
+            members = self._ending.get(str(hole.node), []) if hole.member is None else [hole.member]
+            for member in members:
+                yield member, piece[0].member != piece[1].member or hole.member is None, float(np.linalg.norm(hole.arm))
+
+    def _share(self, load: Load | Tendon) -> float:
         return _largest(self._scene, load.history)
 
     def _weigh(self, pull: float) -> None:

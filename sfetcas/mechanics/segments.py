@@ -15,7 +15,7 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..description.structure import SLIDING
-from ..description.tendons import Piece, holes_along, pieces_of
+from ..description.tendons import holes_along
 from ..mathematics import interpolation
 from ..mathematics.arrays import Array, Index
 from .mesh import Mesh
@@ -122,7 +122,7 @@ def _retained_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
     spread = [load.part for load in following if load.type == "distributed"]
     wanted = {cut for a, b in spread for cut in range(_nearest(cuts, a), _nearest(cuts, b) + 1)}
     wanted |= {_nearest(cuts, load.at or 0.0) for load in following if load.type != "distributed"}
-    for pieces in pieces_of_tendons(scene):
+    for pieces in scene.tendon_pieces.values():
         wanted |= {_nearest(cuts, at) for at in holes_along(pieces, member)}
     return [cut for cut in inner if cut in wanted]
 
@@ -130,12 +130,6 @@ def _retained_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
 def _nearest(cuts: Array, place: float) -> int:
     """Index of the cut that is nearest to a fraction of the length."""
     return int(np.argmin(np.abs(cuts - place)))
-
-
-def pieces_of_tendons(scene: Scene) -> Iterator[list[Piece]]:
-    """The pieces of the way of each tendon."""
-    for tendon in scene.tendons.values():
-        yield pieces_of(tendon, scene.nodes, scene.members, scene.center_lines)
 
 
 def _pushed(scene: Scene) -> set[str | None]:
@@ -154,7 +148,7 @@ def _sprung(scene: Scene) -> Iterator[str]:
     for name in scene.members:
         if name in pushed:
             yield from scene.members[name].nodes
-    for pieces in pieces_of_tendons(scene):
+    for pieces in scene.tendon_pieces.values():
         for hole in (hole for piece in pieces if isinstance(piece, tuple) for hole in piece):
             yield from [hole.node] if hole.node is not None else []
             yield from scene.members[hole.member].nodes if hole.member is not None else ()

@@ -20,7 +20,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ..description.tendons import Stretch, pieces_of, tangent
+from ..description.tendons import Stretch, tangent
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers
 from .beams import in_fixed_axes
@@ -36,8 +36,8 @@ def stretches_of(scene: Any, member: str) -> list[tuple[str, Stretch]]:
     """The stretches of tendons along a member, with the names of the tendons."""
     return [
         (name, piece)
-        for name, tendon in scene.tendons.items()
-        for piece in pieces_of(tendon, scene.nodes, scene.members, scene.center_lines)
+        for name, pieces in scene.tendon_pieces.items()
+        for piece in pieces
         if isinstance(piece, Stretch) and piece.member == member
     ]
 

@@ -24,7 +24,7 @@ from typing import Any, ClassVar, final
 import casadi as ca
 import numpy as np
 
-from ..description.tendons import Hole, Stretch, Tendon, pieces_of, tangent
+from ..description.tendons import Hole, Stretch, Tendon, tangent
 from ..mathematics.arrays import Array, numbers
 from .elements import Element
 from .parts import Parts
@@ -187,9 +187,8 @@ class _Maker:
 
     def all(self) -> Iterator[One]:
         scene, scales = self.parts.scene, self.parts.scales
-        pieces = pieces_of(self.tendon, scene.nodes, scene.members, scene.center_lines)
         found, still = list[One](), 0.0
-        for piece in pieces:
+        for piece in scene.tendon_pieces[self.name]:
             if isinstance(piece, tuple):
                 found.append(self._strung(*piece))
             elif scene.members[piece.member].type == "rigid":

@@ -152,6 +152,10 @@ def commanded(scene: Scene, commands: Mapping[str, History]) -> Scene:
         if path[0] == "histories":
             histories[path[1]] = _table(history)
             continue
+        if path[0] == "tendons":
+            histories[name] = _table(history)
+            table["tendons"][path[1]] |= {path[2]: 1.0, "history": name}
+            continue
         load = path[1]
         own = f"{load} {' '.join(path[2:])}"
         histories[own] = _table(history)
