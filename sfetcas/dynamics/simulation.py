@@ -148,9 +148,7 @@ class Simulation:
 
     @property
     def _kinks(self) -> set[float]:
-        used = {load.history for load in self.scene.loads.values()}
-        used |= {motion.history for motion in self.scene.motions.values()}
-        return {t for name in used if name is not None for t in self.scene.histories[name].kinks}
+        return {t for name in self.scene.histories_used for t in self.scene.histories[name].kinks}
 
     # -- one run ----------------------------------------------------------------------------------------
 
@@ -406,7 +404,7 @@ LOST_RUNS = 0.1
 def _keeps_energy(model: Model) -> bool:
     """Whether nothing changes the total energy: no history, motion, load without potential, drag or damping."""
     scene = model.scene
-    given = any(load.history is not None for load in scene.loads.values()) or bool(scene.motions)
+    given = bool(scene.histories_used) or bool(scene.motions)
     given = given or not model.has_potential
     taken = any(part.damping or part.drag for part in scene.sections.values())
     taken = taken or any(spring.damping for spring in scene.springs.values())

@@ -36,6 +36,9 @@ from .statement import Control, Variable
 
 __all__ = ["ControlledSystem"]
 
+COMMANDED = ("loads", "actuations", "fields", "histories")
+"""Tables of what may change with time as a control says."""
+
 
 class ControlledSystem:
     """One scene on one mesh, with controls and unknown constants.
@@ -98,11 +101,13 @@ class ControlledSystem:
     def _refuse(self, controls: Sequence[Control], variables: Sequence[Variable]) -> None:
         scene, names = self.scene, [one.name for one in controls]
         for name in names:
-            if not name.startswith(("loads.", "histories.")):
-                accepted = "a component of the value of a load, or histories.NAME of a load"
+            path = name.split(".")
+            field = scene.fields.get(path[1]) if path[0] == "fields" else None
+            if path[0] not in COMMANDED or (field is not None and (field.type == "dipole" or "value" not in path)):
+                accepted = "a component of the value of a load, an actuation or a field, or histories.NAME of one"
                 raise SceneError(f"found {name!r}, accepted: {accepted}", ("controls",))
-        used = {load.history for load in scene.loads.values() if load.history is not None}
-        for name in sorted(used):
+        moved = {motion.history for motion in scene.motions.values()}
+        for name in sorted(scene.histories_used - moved):
             if f"histories.{name}" not in names:
                 message = f"found the history {name!r}, accepted: loads that are constant or controlled"
                 raise SceneError(f"{message}, as controls {{'histories.{name}': (low, high)}}", ("histories",))
