@@ -217,7 +217,21 @@ def test_expressions_say_what_answers_say():
     """Each name that both know, of a frame in the plane and of a bent rod in space."""
     square = {"shape": "rectangle", "width": 0.03, "height": 0.02, "E": 1e6, "nu": 0.3}
     force = {"f": {"type": "force", "node": "B", "value": [0, 0.002, 0.004]}}
-    rod = beam(square, loads=force, springs={"k": {"node": "B", "stiffness": 1e-3, "axis": [0, 0, 1]}})
+    rod = beam(
+        square,
+        loads=force,
+        springs={"k": {"node": "B", "stiffness": 1e-3, "axis": [0, 0, 1]}},
+        actuations={"k": {"member": "m", "value": [0.3, -0.4, 0.5], "profile": {"polynomial": [1, 1]}}},
+        fields={
+            "even": {"value": [0.02, 0.03, -0.01]},
+            "coil": {"type": "linear", "gradient": [[0.1, 0, 0.02], [0, -0.05, 0], [0.02, 0, -0.05]]},
+            "magnet": {"type": "dipole", "position": [0.2, 0.4, -0.3], "moment": [100.0, 200.0, 50.0]},
+        },
+        magnets={
+            "strip": {"member": "m", "moment_density": [0.1, 0.02, 0.03], "span": [0.1, 0.9]},
+            "tip": {"node": "B", "moment": [0.05, 0, 0.02]},
+        },
+    )
     met = set()
     for scene in (frame(), rod, driven("plane"), driven("space")):
         names = []

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import tolerances
-from ..description.scene import Analysis, History, Load, Motion, Node, Scene
+from ..description.scene import Analysis, History, Node, Scene
 from ..description.sections import evaluate
 from ..description.structure import SLIDING, released
 from ..equilibria import statics, stops
@@ -33,7 +33,7 @@ def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
     """
     histories = scene.histories
 
-    def now(record: Load | Motion) -> dict[str, Any]:
+    def now(record: Any) -> dict[str, Any]:
         if record.history is None:
             return {}
         factor = histories[record.history].factor(0.0)
@@ -42,23 +42,25 @@ def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
             **{key: _scaled(getattr(record, key), factor) for key in DRIVEN if hasattr(record, key)},
         }
 
-    loads = {name: load.model_copy(update=now(load)) for name, load in scene.loads.items()}
-    motions = {name: motion.model_copy(update=now(motion)) for name, motion in scene.motions.items()}
+    driven: dict[str, Any] = {}
+    for table, name, record in scene.driven:
+        if table != "tendons":
+            driven.setdefault(table, {})[name] = record.model_copy(update=now(record))
     analysis = Analysis(accuracy=scene.analysis.accuracy, unstable=scene.analysis.unstable)
     nodes = {name: node.model_copy(update={"velocity": None}) for name, node in scene.nodes.items()}
     members = {name: member.model_copy(update={"spin": None}) for name, member in scene.members.items()}
-    tables: dict[str, Any] = {"loads": loads, "motions": motions, "nodes": nodes, "members": members}
-    still = {name: history.factor(0.0) for name, history in histories.items()} if scene.tendons else {}
     # Of tendons what their histories begin with.
-    tables["histories"] = {name: History(t=(0.0, 1.0), value=(factor, factor)) for name, factor in still.items()}
+    still = {name: history.factor(0.0) for name, history in histories.items()} if scene.tendons else {}
+    driven["histories"] = {name: History(t=(0.0, 1.0), value=(factor, factor)) for name, factor in still.items()}
+    tables: dict[str, Any] = {**driven, "nodes": nodes, "members": members}
     # What acts later only, or is cut, may be all that makes a scene one in space.
     tables |= {"dimension": scene.resolved_dimension, "analysis": analysis, "expect": ()}
     before = Scene(**{**_given_keys(scene), **tables})
     return (stops.solve_stopped(before, settings) if scene.stopped else statics.solve(before, settings)).last
 
 
-DRIVEN = ("value", "displacement", "rotation")
-"""Keys of loads and prescribed motions whose values a history multiplies."""
+DRIVEN = ("value", "displacement", "rotation", "gradient", "moment")
+"""Keys of loads, prescribed motions, actuations and fields whose values a history multiplies."""
 
 
 def _given_keys(scene: Scene) -> dict[str, Any]:
@@ -69,7 +71,7 @@ def _given_keys(scene: Scene) -> dict[str, Any]:
 def _scaled(value: Any, factor: float) -> Any:
     if value is None:
         return None
-    return tuple(factor * part for part in value) if isinstance(value, tuple) else factor * value
+    return tuple(_scaled(part, factor) for part in value) if isinstance(value, tuple) else factor * value
 
 
 def moving(scene: Scene) -> Scene:

@@ -303,7 +303,7 @@ class ModalAnalysis:
         scene = self.scene
         sprung = any(spring.rest or spring.length is not None for spring in scene.springs.values())
         everywhere = scene.gravity is not None or scene.rotating is not None
-        if not (scene.loads or scene.motions or scene.tendons or everywhere or sprung):
+        if not any(scene.driven) and not everywhere and not sprung:
             return None
         check_floating(scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension)
         found = statics.solve(scene, self.settings)

@@ -148,10 +148,7 @@ class Simulation:
 
     @property
     def _kinks(self) -> set[float]:
-        used = {load.history for load in self.scene.loads.values()}
-        used |= {motion.history for motion in self.scene.motions.values()}
-        used |= {tendon.history for tendon in self.scene.tendons.values()}
-        return {t for name in used if name is not None for t in self.scene.histories[name].kinks}
+        return {t for name in self.scene.histories_used for t in self.scene.histories[name].kinks}
 
     # -- one run ----------------------------------------------------------------------------------------
 
@@ -407,8 +404,8 @@ LOST_RUNS = 0.1
 def _keeps_energy(model: Model) -> bool:
     """Whether nothing changes the total energy: no history, motion, load without potential, drag or damping."""
     scene = model.scene
-    given = any(load.history is not None for load in scene.loads.values()) or bool(scene.motions)
-    given = given or any(tendon.history is not None for tendon in scene.tendons.values()) or not model.has_potential
+    given = bool(scene.histories_used) or bool(scene.motions)
+    given = given or not model.has_potential
     taken = any(part.damping or part.drag for part in scene.sections.values())
     taken = taken or any(spring.damping for spring in scene.springs.values())
     return not (given or taken or scene.rotating is not None or any(node.drag for node in scene.nodes.values()))

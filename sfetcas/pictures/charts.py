@@ -187,7 +187,7 @@ def _telling(path: Path) -> _Quantity:
     lie on each other there.
     """
     scene = path.scene
-    driven = not scene.loads and not scene.tendons and scene.gravity is None
+    driven = scene.gravity is None and all(table == "motions" for table, _, _ in scene.driven)
     found = list(_reactions(path) if driven else _displacements(path))
     loaded = {load.node: np.abs(load.vector) for load in scene.loads.values() if load.type == "force"}
 

@@ -36,6 +36,9 @@ from .statement import Control, Variable
 
 __all__ = ["ControlledSystem"]
 
+COMMANDED = ("loads", "tendons", "actuations", "fields", "histories")
+"""Tables of what may change with time as a control says."""
+
 
 class ControlledSystem:
     """One scene on one mesh, with controls and unknown constants.
@@ -98,17 +101,18 @@ class ControlledSystem:
     def _refuse(self, controls: Sequence[Control], variables: Sequence[Variable]) -> None:
         scene, names = self.scene, [one.name for one in controls]
         for name in names:
-            if not name.startswith(("loads.", "histories.", "tendons.")):
-                accepted = "a component of the value of a load, or histories.NAME of a load, or a number of a tendon"
-                raise SceneError(f"found {name!r}, accepted: {accepted}", ("controls",))
+            path = name.split(".")
+            field = scene.fields.get(path[1]) if path[0] == "fields" else None
+            if path[0] not in COMMANDED or (field is not None and (field.type == "dipole" or "value" not in path)):
+                accepted = "a component of the value of a load, an actuation or a field, a number of a tendon, or"
+                raise SceneError(f"found {name!r}, accepted: {accepted} histories.NAME of one", ("controls",))
         for name, tendon in scene.tendons.items():
             controlled = any(one.startswith(f"tendons.{name}.") for one in names) or tendon.history is not None
             if controlled and tendon.measured and tendon.stiffness is None:
                 message = "found a control of a length that has to be followed at once, accepted: of a tension, or of a"
                 raise SceneError(f"{message} tendon with a stiffness", ("controls", f"tendons.{name}"))
-        histories = [load.history for load in scene.loads.values()]
-        used = {name for name in (*histories, *(t.history for t in scene.tendons.values())) if name is not None}
-        for name in sorted(used):
+        moved = {motion.history for motion in scene.motions.values()}
+        for name in sorted(scene.histories_used - moved):
             if f"histories.{name}" not in names:
                 message = f"found the history {name!r}, accepted: loads that are constant or controlled"
                 raise SceneError(f"{message}, as controls {{'histories.{name}': (low, high)}}", ("histories",))

@@ -136,7 +136,8 @@ class _Timed(Simulation):
 
 
 def commanded(scene: Scene, commands: Mapping[str, History]) -> Scene:
-    """The scene with histories in the place of numbers: components of loads, or histories that loads have.
+    """The scene with histories in the place of numbers: components of the values of loads, actuations and fields, or
+    histories that these have.
 
     Raises
     ------
@@ -145,7 +146,7 @@ def commanded(scene: Scene, commands: Mapping[str, History]) -> Scene:
     """
     table = scene.to_dict()
     table["dimension"] = scene.resolved_dimension
-    histories, loads = table.setdefault("histories", {}), table.setdefault("loads", {})
+    histories = table.setdefault("histories", {})
     for name, history in commands.items():
         argument(scene, name)
         path = name.split(".")
@@ -156,13 +157,15 @@ def commanded(scene: Scene, commands: Mapping[str, History]) -> Scene:
             histories[name] = _table(history)
             table["tendons"][path[1]] |= {path[2]: 1.0, "history": name}
             continue
-        load = path[1]
+        load, loads = path[1], table[path[0]]
         own = f"{load} {' '.join(path[2:])}"
         histories[own] = _table(history)
-        value = plain(scene.loads[load].value)
+        value = plain(getattr(scene, path[0])[load].value)
         index = int(path[3]) if len(path) > 3 else None
         unit: Any = 1.0 if index is None else [float(i == index) for i in range(len(value))]
-        loads[own] = {**loads[load], "value": unit, "history": own}
+        more = {**loads[load], "value": unit, "history": own}
+        # What else a field does is told of once.
+        loads[own] = {"type": "uniform", "value": unit, "history": own} if path[0] == "fields" else more
         if index is None:
             loads[load]["value"] = 0.0
         else:
