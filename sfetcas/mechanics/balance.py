@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, scattered
 from ..mathematics.keeping import kept
 from .batches import GroupBatch
 from .connections import connections_of
 from .equations import Equations, State
+from .load_terms import elements_of
 from .loading import Loading
 from .terms import answers_of
 
@@ -110,7 +111,16 @@ class Balance:
 
     def starting_moments(self, elements: slice) -> Array:
         """Moments (n, 3) that the surroundings exert on the first nodes of elements."""
-        return self._three(self._shares[0][elements, : self._turns])
+        found = self._shares[0][elements, : self._turns]
+        for number, group in enumerate(self.model.terms):
+            if group.kind.along_element and not group.kind.is_load:
+                found = (
+                    found
+                    + scattered(len(self._shares[0]), elements_of(group), self._shares[number][:, : self._turns])[
+                        elements
+                    ]
+                )
+        return self._three(found)
 
     def start_moment(self, member: str) -> Array:
         """Moment (3,) that the surroundings exert on the first end of a flexible or rigid member."""

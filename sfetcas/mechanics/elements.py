@@ -126,6 +126,15 @@ class Element(Term):
         here = ca.mtimes(q, ca.DM(interpolation.evaluation(self.nodes, self.points).T)) if self.gauss else q
         return here, slope
 
+    def bent(self, q: ca.SX) -> ca.SX:
+        """Changes of the curvature times length at the points (3 or 1, p + 1), about the fixed axes of the undeformed
+        scene, in the plane about z, from the rotations of the nodes (components, p + 1).
+        """
+        here, slope = self._at_points(q)
+        if not self.space:
+            return slope
+        return ca.horzcat(*[self._curvature(here[:, k], slope[:, k]) for k in range(self.order + 1)])
+
     def _curvature(self, here: ca.SX, slope: ca.SX) -> ca.SX:
         """Change of the curvature times length at one point in space, about the fixed axes of the undeformed scene."""
         q = ca.vertsplit(here)

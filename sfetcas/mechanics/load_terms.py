@@ -397,7 +397,7 @@ def spread_of(expressions: Any, q: ca.MX, given: Any) -> tuple[ca.MX, ca.MX]:
     spread = ca.reshape(given.spread, axes, -1)
     pull = ca.MX(*spread.shape)
     for number, group in enumerate(model.terms):
-        if not group.kind.along_element:
+        if not (group.kind.along_element and group.kind.is_load):
             continue
         points = (elements_of(group)[:, None] * n + np.arange(n)).ravel()
         forces = ca.reshape(expressions.load(number, given), axes, len(points))
@@ -412,5 +412,5 @@ def spread_of(expressions: Any, q: ca.MX, given: Any) -> tuple[ca.MX, ca.MX]:
 
 
 def elements_of(group: Group) -> Array:
-    """Numbers (n,) of the elements that the terms of a group of distributed loads act along."""
+    """Numbers (n,) of the elements that the terms of a group act along."""
     return np.array([int(name.rpartition(" ")[2]) for name in group.names], dtype=np.intp)

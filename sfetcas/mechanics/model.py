@@ -23,6 +23,7 @@ from ..mathematics.arrays import Array, Index
 from .beams import Beams, Scales, beams_of, scales_of
 from .connections import connections_in, touches_in
 from .elements import Element, element_by_name
+from .laws import laws_in
 from .load_terms import loads_in
 from .loading import Loading, unit_loadings
 from .mesh import Mesh
@@ -38,7 +39,7 @@ from .unwrapping import Unwrapping, unwrapping_of
 __all__ = ["SOURCES", "Block", "Model", "assemble"]
 
 
-SOURCES: list[Callable[[Parts], Iterable[One]]] = [connections_in, touches_in, loads_in]
+SOURCES: list[Callable[[Parts], Iterable[One]]] = [connections_in, touches_in, laws_in, loads_in]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
 
 

@@ -96,7 +96,7 @@ class Term(Components, abc.ABC):
     """What a prescribed motion gives by its ``load``: ``angle`` or ``travel``; empty where it is no driven joint."""
 
     along_element: ClassVar[bool] = False
-    """Whether its loads are forces at the nodes of an element, whose rotations are its sides."""
+    """Whether it acts along an element, whose rotations are its sides: its moments are part of the section moments."""
 
     on_face: ClassVar[bool] = False
     """Whether its row keeps a place on the surface of an obstacle."""

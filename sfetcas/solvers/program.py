@@ -21,6 +21,7 @@ from ..mathematics.constants import sparse, times
 from ..mathematics.linear import pattern
 from ..mechanics.equations import UNLOADED, State
 from ..mechanics.expressions import LOADS, Expressions, Given, moved_by
+from ..mechanics.load_terms import elements_of
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import RotationFreedom
@@ -169,7 +170,17 @@ class Program:
         expressions = self.expressions
         if not expressions.elements:
             return ca.MX(1, 0)
-        return expressions.many(energies_of(self.model.element), expressions.elements)(*self._arguments[0])[1]
+        found = ca.MX(1, expressions.elements)
+        for number, group in enumerate(self.model.terms):
+            if number and not (group.kind.along_element and not group.kind.is_load):
+                continue
+            energies = expressions.many(energies_of(group.kind), len(group.data))(*self._arguments[number])[1]
+            if number == 0:
+                found += energies
+            else:
+                each, n = elements_of(group), len(group.data)
+                found += times(sparse(each, np.arange(n), np.ones(n), (expressions.elements, n)), energies.T).T
+        return found
 
     @property
     def strain(self) -> ca.MX:
