@@ -324,9 +324,9 @@ DRAWING = ("plot", "animate")
 PYPLOT = "pictures.showing"
 """The module that imports pyplot, which looks for a window system, when a figure is to be shown."""
 
-DISPATCHERS = ("analyses", "outputs", "cli", "equilibria.statics")
+DISPATCHERS = ("analyses", "outputs", "cli", "equilibria.statics", "description.laws")
 """What chooses, by a scene or by the words of a command, among much of which a run needs little: it imports what it
-chose."""
+chose.  Potentials alone, of all that describes a scene, are expressions of CasADi."""
 
 
 def named(path):

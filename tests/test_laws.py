@@ -473,30 +473,15 @@ def test_end_of_a_table_is_told():
 
 
 def test_lost_convexity_is_told():
-    """A potential that is convex at rest only, beyond where it is."""
-    law = {"type": "potential", "potential": lambda k: 0.5 * ca.sumsqr(k) + k[2] ** 4 * 0.25 - k[2] ** 3 * 0.6}
-    notes = sfetcas.solve(
-        scene(
-            law,
-            {"type": "moment", "node": "B", "value": 0.5},
-            nodes={"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0], "start": [0.7, 0.6]}},
-        )
-    ).last.notes
-    assert isinstance(notes, tuple)
-    bent = (
-        scene(
-            law,
-            loads={},
-            motions={"turn": {"node": "B", "rotation": 0.6}},
-            nodes={
-                "A": {"position": [0, 0], "support": "clamped"},
-                "B": {"position": [0.9, 0], "support": "slider", "direction": [1, 0]},
-            },
-        )
-        if False
-        else None
+    """A strip whose moment falls between curvatures 0.714 and 1.667: the path has its limit points there."""
+    law = {"type": "potential", "potential": lambda k: 0.5 * ca.sumsqr(k) - k[2] ** 3 / 3.0 + 0.07 * k[2] ** 4}
+    assert not sfetcas.solve(scene(law, {"type": "moment", "node": "B", "value": 0.25})).last.notes
+    path = sfetcas.solve(scene(law, analysis={"type": "path", "range": [0, 0.5], "steps": [0.4]}))
+    moments = [k - k**2 + 0.28 * k**3 for k in ((2 - 0.8) / 1.68, (2 + 0.8) / 1.68)]
+    np.testing.assert_allclose(
+        sorted(1.5 * point.factor for point in path.main.limit_points), sorted(moments), rtol=1e-5
     )
-    assert bent is None
+    assert any("is not convex at changes of the curvatures of (0, 0, 1" in note for note in path.notes)
 
 
 def test_stress_is_not_told():

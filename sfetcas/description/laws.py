@@ -23,7 +23,17 @@ from ..mathematics.forms import BOTH, Form, hermite_of, monotone_slopes
 from ..mathematics.interpolation import gauss
 from .records import Number, Numbers, Positive, Record, listed, number, say
 
-__all__ = ["Bilinear", "Law", "MomentTable", "Plateau", "Potential", "RambergOsgood", "Ribbon", "StressStrain"]
+__all__ = [
+    "Bilinear",
+    "Law",
+    "MomentTable",
+    "Plateau",
+    "Potential",
+    "RambergOsgood",
+    "Ribbon",
+    "SectionLaw",
+    "StressStrain",
+]
 
 About = Literal["b2", "b3", "both"]
 
