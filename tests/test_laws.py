@@ -1,6 +1,7 @@
 """Sections whose moment is not proportional to the change of the curvature: every analysis, by independent ways."""
 
 import re
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,8 @@ from test_codegen import built, needs_compiler, said
 import sfetcas
 from sfetcas import CrossSection, Scene, SceneError
 from sfetcas.mathematics.potentials import derivatives_of
+from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.fields import Fields
 from sfetcas.solvers.globalised import Code
 
 BILINEAR = {"type": "bilinear", "moment": 1.0, "ratio": 0.2}
@@ -473,15 +476,27 @@ def test_end_of_a_table_is_told():
 
 
 def test_lost_convexity_is_told():
-    """A strip whose moment falls between curvatures 0.714 and 1.667: the path has its limit points there."""
+    """A strip whose moment falls between curvatures 0.714 and 1.667, bent to an arc of curvature 1.2 or 0.6."""
     law = {"type": "potential", "potential": lambda k: 0.5 * ca.sumsqr(k) - k[2] ** 3 / 3.0 + 0.07 * k[2] ** 4}
-    assert not sfetcas.solve(scene(law, {"type": "moment", "node": "B", "value": 0.25})).last.notes
-    path = sfetcas.solve(scene(law, analysis={"type": "path", "range": [0, 0.5], "steps": [0.4]}))
-    moments = [k - k**2 + 0.28 * k**3 for k in ((2 - 0.8) / 1.68, (2 + 0.8) / 1.68)]
-    np.testing.assert_allclose(
-        sorted(1.5 * point.factor for point in path.main.limit_points), sorted(moments), rtol=1e-5
-    )
-    assert any("is not convex at changes of the curvatures of (0, 0, 1" in note for note in path.notes)
+    found = sfetcas.solve(scene(law, {"type": "moment", "node": "B", "value": 0.2})).last
+    assert not found.notes
+    for k, told in ((0.6, ()), (1.2, ("is not convex at changes of the curvatures of (0, 0, 1.2) 1/m, as of",))):
+        q = np.zeros_like(found.state.q)
+        q[found.model.chain("beam"), 0] = k * found.model.along("beam")
+        bent = Fields(Equations(found.model), replace(found.state, q=q), found.loading)
+        notes = bent.beyond_laws()
+        assert len(notes) == len(told)
+        assert all(words in note for words, note in zip(told, notes, strict=True))
+
+
+def test_path_tells_the_end_of_a_table():
+    short = {"type": "table", "curvature": [0.0, 1.0, 2.0], "moment": [0.0, 1.0, 1.6]}
+    tip = {"type": "moment", "node": "B", "value": 2.0}
+    path = sfetcas.solve(scene(short, tip, analysis={"type": "path", "range": [0, 1.0]}))
+    (note,) = path.notes
+    factor = float(re.match(r"at factor (\S+) the law 'table' of section 's' ends at a curvature of 2 1/m", note)[1])
+    # The first point beyond a moment of 1.6.
+    assert factor == pytest.approx(min(f for f in path.main.factors if f > 0.8), rel=1e-5)
 
 
 def test_stress_is_not_told():
