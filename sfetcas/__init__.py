@@ -44,6 +44,13 @@ if TYPE_CHECKING:
     from .description.actuation import MagneticField as MagneticField
     from .description.contacts import Contact as Contact
     from .description.formulas import Formula as Formula
+    from .description.laws import Bilinear as Bilinear
+    from .description.laws import MomentTable as MomentTable
+    from .description.laws import Plateau as Plateau
+    from .description.laws import Potential as Potential
+    from .description.laws import RambergOsgood as RambergOsgood
+    from .description.laws import Ribbon as Ribbon
+    from .description.laws import StressStrain as StressStrain
     from .description.scene import Analysis as Analysis
     from .description.scene import Expect as Expect
     from .description.scene import History as History
@@ -141,6 +148,7 @@ _PUBLIC = {
     "codegen.timestep": "TimeStep",
     "description.actuation": "Actuation Magnet MagneticField",
     "description.contacts": "Contact",
+    "description.laws": "Bilinear MomentTable Plateau Potential RambergOsgood Ribbon StressStrain",
     "description.scene": "Analysis Expect History Load Member Motion Node Scene Until",
     "description.scenefile": "dump load",
     "description.formulas": "Formula",

@@ -41,6 +41,8 @@ ORDER = [
     "mathematics.spectra",
     "mathematics.pieces",
     "mathematics.relations",
+    "mathematics.forms",
+    "mathematics.potentials",
     "mathematics.statements",
     "description",
     "description.described",
@@ -50,6 +52,7 @@ ORDER = [
     "description.answers",
     "description.matrices",
     "description.formulas",
+    "description.laws",
     "description.sections",
     "description.shapes",
     "description.changes",
@@ -79,6 +82,7 @@ ORDER = [
     "mechanics.positions",
     "mechanics.beams",
     "mechanics.parts",
+    "mechanics.laws",
     "mechanics.singles",
     "mechanics.load_terms",
     "mechanics.actuation",
@@ -328,9 +332,9 @@ DRAWING = ("plot", "animate")
 PYPLOT = "pictures.showing"
 """The module that imports pyplot, which looks for a window system, when a figure is to be shown."""
 
-DISPATCHERS = ("analyses", "outputs", "cli", "equilibria.statics")
+DISPATCHERS = ("analyses", "outputs", "cli", "equilibria.statics", "description.laws")
 """What chooses, by a scene or by the words of a command, among much of which a run needs little: it imports what it
-chose."""
+chose.  Potentials alone, of all that describes a scene, are expressions of CasADi."""
 
 
 def named(path):

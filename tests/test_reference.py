@@ -23,7 +23,7 @@ each = pytest.mark.parametrize(("record", "key"), list(KEYS), ids=[f"{record}-{k
 
 
 def test_every_record_has_its_table():
-    # A straight line has no keys.
+    # A straight line has no keys, and a ribbon none but its type.
     assert set(RECORDS) - {"Straight"} == set(reference.TABLES)
 
 

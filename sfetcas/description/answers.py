@@ -111,8 +111,11 @@ def _supported(scene: Any, record: Any) -> bool:
 
 
 def outlined(scene: Any, record: Any) -> bool:
-    """Whether a member is flexible and its section has a shape, so that its fibres are known."""
-    return record.type == "flexible" and scene.sections[str(record.section)].shape is not None
+    """Whether a member is flexible and its section has a shape and no law, so that its fibres are linear elastic."""
+    if record.type != "flexible":
+        return False
+    section = scene.sections[str(record.section)]
+    return section.shape is not None and section.law is None
 
 
 TABLE = """

@@ -8,7 +8,7 @@ import operator
 import re
 from collections.abc import Iterable, Mapping, Sequence, Set
 from types import MappingProxyType
-from typing import Annotated, Any, NoReturn, TypeVar
+from typing import Annotated, Any, NoReturn, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
@@ -393,8 +393,14 @@ def sentence(error: ValidationError, record: type[BaseModel]) -> SceneError:
 def _place(loc: tuple[int | str, ...], record: type[BaseModel]) -> tuple[str, ...]:
     """The keys on the way to a finding, without what pydantic adds to them."""
     field = record.model_fields.get(name_of(record, str(loc[0]))) if loc else None
-    tagged = field is not None and field.discriminator is not None
+    tagged = field is not None and _tagged(field)
     return tuple(str(part) for part in (loc[:1] + loc[2:] if tagged else loc) if part != "[key]")
+
+
+def _tagged(field: FieldInfo) -> bool:
+    """Whether a key takes one of several records, told apart by their ``type``, or also nothing."""
+    inner = (info for part in get_args(field.annotation) for info in getattr(part, "__metadata__", ()))
+    return any(getattr(info, "discriminator", None) is not None for info in (field, *inner))
 
 
 def _choice(found: Any, expected: str) -> str:

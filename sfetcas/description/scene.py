@@ -519,6 +519,10 @@ def _check_sections(scene: Scene) -> None:
                 outlined = scene.sections[str(member.section)].shape is not None
                 key, why = "rho" if outlined else key, _need_of_mass(scene, f"members.{name}", "the mass per length")
             raise SceneError(f"the key {key!r} is missing: {why}", ("sections", str(member.section)))
+        law = None if member.section is None else scene.sections[member.section].law
+        if law is not None and member.type != "flexible":
+            message = f"found a section with the law {law.type!r} of a {member.type} member"
+            raise SceneError(f"{message}, accepted: of flexible members", ("members", name, "section"))
         if member.stiffness is not None and member.mass is None and _massive(scene):
             why = _need_of_mass(scene, "the member", "the member")
             raise SceneError(f"the key 'mass' is missing: {why}", ("members", name))
@@ -693,6 +697,10 @@ def _check_contacts(scene: Scene) -> None:
                     ("contacts", name),
                 )
             _check_stretching_contact(scene, name, member)
+            law = scene.sections[str(scene.members[member].section)].law if scene.members[member].section else None
+            if law is not None:
+                message = f"found the member {member!r}, whose section has the law {law.type!r}"
+                raise SceneError(f"{message}, accepted: members without laws touch obstacles", ("contacts", name))
             line = scene.center_lines[member]
             try:
                 check_start(obstacle(contact, space), line.positions, line.tangents, scene.size)

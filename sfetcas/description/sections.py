@@ -16,6 +16,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import numbers, values_of
 from ..mathematics.interpolation import power_series
 from .formulas import SAMPLES, Formula
+from .laws import Law
 from .records import NotNegative, Number, Numbers, Record, number, say
 
 __all__ = ["CrossSection", "Polynomial", "Quantity", "Table", "Varying", "breaks", "evaluate", "quantity"]
@@ -291,9 +292,13 @@ class CrossSection(Record):
         Mass per length.  Needed with gravity, rotating axes, modes and motions.
     rhoI : (3,), kg m
         Rotary inertia per length about b1, b2, b3, for modes and motions.  Default: zero.
+    law : table
+        Moments that are not proportional to the change of the curvature: a table with the key ``type``
+        (``bilinear``, ``ramberg-osgood``, ``plateau``, ``table``, ``stress-strain``, ``audoly-neukirch`` or, in
+        Python, ``potential``) and the keys of that law.  Default: linear.
     damping : s
         Retardation time of Kelvin and Voigt: a moment, and a force where it stretches or shears, is the stiffness
-        times (the strain + ``damping`` times its rate).
+        times (the strain + ``damping`` times its rate).  With a law it is that of the stiffness at rest.
     drag : N s/m²
         Force per length against the velocity, per unit of the velocity.
     shape : text
@@ -341,6 +346,7 @@ class CrossSection(Record):
     coupling: Annotated[tuple[Varying, Varying, Varying], BeforeValidator(_three)] | None = None
     rhoA: Above | None = None
     rhoI: Annotated[tuple[Inertia, Inertia, Inertia], BeforeValidator(_three)] | None = None
+    law: Law | None = None
     damping: NotNegative = 0.0
     drag: NotNegative = 0.0
     shape: Literal["rectangle", "circle", "tube"] | None = None
@@ -369,11 +375,34 @@ class CrossSection(Record):
             self._check_shape(self.shape)
         elif outlined := self._given((*_MATERIAL, *_DIMENSIONS, "shear_factor")) or self._switched():
             raise SceneError(f"found {outlined[0]!r} without a shape, accepted: shape = {' | '.join(_OUTLINES)}")
-        elif not numbers:
+        elif not numbers and not (self.law is not None and self.law.gives):
             raise SceneError(f"found nothing in it, accepted: {', '.join(_NUMBERS)} or a shape")
         if self.coupling is not None:
             self._check_coupling()
+        if self.law is not None:
+            self._check_law(self.law)
         return self
+
+    def _check_law(self, law: Law) -> None:
+        if self.coupling is not None:
+            raise SceneError("found a law beside a coupling, accepted: one of them; a potential may couple", ("law",))
+        if law.shaped and self.shape is None:
+            accepted = "a shape" if law.shaped == "any" else f"shape = {law.shaped!r}"
+            raise SceneError(f"found {law.type!r} without a shape, accepted: with {accepted}, E and G or nu", ("law",))
+        if law.shaped not in ("", "any", self.shape):
+            raise SceneError(f"found {law.type!r} with a {self.shape}, accepted: with a {law.shaped}", ("law",))
+        twice = [name for name in law.gives if self.shape is not None or getattr(self, name) is not None]
+        if twice:
+            found = repr(twice[0]) if self.shape is None else f"shape = {self.shape!r}"
+            message = f"found {found} beside the law {law.type!r}, which says that stiffness, accepted: one of them"
+            raise SceneError(message, ("law",))
+        missing = self.missing(law.needs)
+        if missing:
+            raise SceneError(f"the key {missing[0]!r} is missing: the law {law.type!r} begins with that stiffness")
+        try:
+            law.check(self)
+        except SceneError as error:
+            raise error.within("law") from None
 
     def _check_coupling(self) -> None:
         missing = self.missing(("GJ", "EI2", "EI3"))
@@ -440,7 +469,14 @@ class CrossSection(Record):
     def couples(self, axis: int) -> bool:
         """Whether bending about the axis b2 or b3, given as 2 or 3, is coupled with anything else."""
         others = {2: (0, 2), 3: (1, 2)}[axis]
+        if self.law is not None and not self.law.stays_in_plane:
+            return True
         return self.coupling is not None and any(self.coupling[i] != 0.0 for i in others)
+
+    @property
+    def coupled(self) -> bool:
+        """Whether the stiffness at rest is more than a diagonal of GJ, EI2 and EI3."""
+        return self.coupling is not None or (self.law is not None and self.law.type == "potential")
 
     def missing(self, names: Iterable[str]) -> list[str]:
         """Which of the names EI2, EI3, GJ, rhoA (N m2, kg/m) this section does not define, in the order given."""
@@ -450,10 +486,11 @@ class CrossSection(Record):
             known = {"EI2", "EI3"}
             known |= {"GJ"} if self._given(("nu", "G")) else set()
             known |= {"rhoA", "rhoI"} if self.rho is not None else set()
+        known |= set(self.law.gives) if self.law is not None else set()
         return [name for name in names if name not in known]
 
     def stiffness(self, x: ArrayLike) -> Floats:
-        """Stiffness along the member.
+        """Stiffness along the member, with a law that at rest.
 
         Parameters
         ----------
@@ -464,6 +501,13 @@ class CrossSection(Record):
         -------
         (n, 3) - GJ, EI2, EI3 in N m2 (about b1, b2, b3), nan where not defined
         """
+        if self.law is None:
+            return self.own_stiffness(x)
+        found = self.stiffness_matrix(x)[:, [0, 1, 2], [0, 1, 2]]
+        return np.where(found == 0.0, np.nan, found)
+
+    def own_stiffness(self, x: ArrayLike) -> Floats:
+        """What :meth:`stiffness` is without the law, (n, 3), N m2, at fractions x (n,)."""
         if self.shape is None:
             return np.stack([self._value(name, x) for name in ("GJ", "EI2", "EI3")], axis=1)
         _, about_2, about_3, torsion = self._outline(x)
@@ -529,7 +573,9 @@ class CrossSection(Record):
         -------
         (n, 3, 3) - moments about b1, b2, b3 by changes of the curvatures about them, N m2, zero where not defined
         """
-        found = np.nan_to_num(self.stiffness(x))[:, :, None] * np.eye(3)
+        found = np.nan_to_num(self.own_stiffness(x))[:, :, None] * np.eye(3)
+        if self.law is not None:
+            return self.law.stiffness(self, found, np.atleast_1d(numbers(x)))
         return found if self.coupling is None else found + self._coupled(x)
 
     def _coupled(self, x: ArrayLike) -> Floats:
@@ -541,7 +587,7 @@ class CrossSection(Record):
 
     def compliance_matrix(self, x: ArrayLike) -> Floats:
         """Inverse (n, 3, 3) of :meth:`stiffness_matrix`, 1/(N m2), at fractions x (n,); zero where not defined."""
-        if self.coupling is None:
+        if not self.coupled:
             values = self.stiffness(x)
             return np.where(np.isnan(values), 0.0, 1.0 / values)[:, :, None] * np.eye(3)
         a, b, c = (self.stiffness_matrix(x)[:, i] for i in range(3))
@@ -556,6 +602,10 @@ class CrossSection(Record):
             "tube": (1.0, ("outer", "outer")),
         }[self.shape or ""]
         return np.stack([self._value("E", x), *(half * self._value(name, x) for name in names)], axis=1)
+
+    def radii(self, x: ArrayLike) -> tuple[Floats, Floats]:
+        """Outer and inner radius (m) of a tube at fractions x (n,), each (n,)."""
+        return self._value("outer", x), self._value("inner", x)
 
     def mass(self, x: ArrayLike) -> Floats:
         """Mass per length: x (n,) fractions of the length -> (n,) kg/m, nan where not known."""

@@ -331,7 +331,7 @@ class Simulation:
             error_estimate=error,
             error_of="" if self.quantity is None else self.quantity.text,
             violation={"norms": run.norm, "closings": run.gap},
-            notes=(*run.notes, *self._unlikely(run), *self._superelement_notes(run)),
+            notes=(*run.notes, *self._unlikely(run), *self._superelement_notes(run), *self._law_notes(run)),
             failure="" if run.failure is None else run.failure.detail,
             record=run.record,
         )
@@ -349,6 +349,13 @@ class Simulation:
         return (
             () if worst is None else tuple(f"at {worst.time:.6g} s {note}" for note in superelement_notes(worst.fields))
         )
+
+    def _law_notes(self, run: MeshRun) -> tuple[str, ...]:
+        """The first instant at which members bend beyond the laws of their sections."""
+        for instant in run.instants:
+            if notes := instant.fields.beyond_laws():
+                return tuple(f"at {instant.time:.6g} s {note}" for note in notes)
+        return ()
 
     def _unlikely(self, run: MeshRun) -> tuple[str, ...]:
         """Notes where a prescribed step, of which nothing estimates the error, is far too short or too long."""

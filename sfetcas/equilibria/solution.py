@@ -566,7 +566,7 @@ def equilibrium(
         state=state,
         loading=found.loading,
         certificate=certificate,
-        notes=(*notes, *superelement_notes(found.fields)),
+        notes=(*notes, *superelement_notes(found.fields), *found.fields.beyond_laws()),
         iterations=iterations,
         strain=found.point.strain,
         potential=found.point.potential,

@@ -43,6 +43,7 @@ class NaturalCurvature(Term):
 
     table: ClassVar[str] = "actuations"
     along_element: ClassVar[bool] = True
+    strains_member: ClassVar[bool] = True
 
     element: Element
 

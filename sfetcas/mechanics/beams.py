@@ -125,7 +125,7 @@ def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beam
         values = np.zeros((x.size, 3))
         if member.type == "flexible":
             section = scene.sections[str(member.section)]
-            coupled = element.space and section.coupling is not None
+            coupled = element.space and section.coupled
             values = section.stiffness_matrix(x.ravel()) if coupled else section.stiffness(x.ravel())
             values = values / (scales.moment * scales.length)
         frames = quaternion.matrix(line.quaternions(x.ravel()))

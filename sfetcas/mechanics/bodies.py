@@ -162,7 +162,7 @@ def compliance_along(scene: Scene, name: str, x: Array) -> Array:
     """
     member, line = scene.members[name], scene.center_lines[name]
     section, frames = scene.sections[str(member.section)], quaternion.matrix(line.quaternions(x))
-    if section.coupling is not None:
+    if section.coupled:
         return np.einsum("nij,njl,nkl->nik", frames, section.compliance_matrix(x), frames)
     values = section.stiffness(x)
     inverse = np.where(np.isnan(values), 0.0, 1.0 / values)

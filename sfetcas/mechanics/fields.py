@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..description.answers import single_number
 from ..mathematics import curves, quaternion
 from ..mathematics.arrays import Array, first_of_largest
@@ -20,6 +21,7 @@ from .balance import Balance, SpringState
 from .balance import three as _three
 from .batches import GroupBatch
 from .equations import Equations, State, scaled_strains, turned_points, turned_tangents
+from .laws import curvature_by_moment, law_of, least_stiffness
 from .loading import Loading
 from .magnetism import magnet_terms
 from .mesh import Touch
@@ -157,7 +159,11 @@ class Fields:
         if record.type == "rigid":
             return {**result, "curvature": line.curvatures(x)}
         section = model.scene.sections[str(record.section)]
-        if section.coupling is not None and model.space:
+        if section.law is not None:
+            axes = [0, 1, 2] if model.space else [line.bending_axis - 1]
+            near = self._changes(member, x)
+            strain = curvature_by_moment(model.scene, member, x, strain, near, axes)
+        elif section.coupled and model.space:
             strain = np.einsum("nij,nj->ni", section.compliance_matrix(x), strain)
         else:
             stiffness = section.stiffness(x)
@@ -219,9 +225,9 @@ class Fields:
     @functools.cached_property
     def _strain_energies(self) -> Array:
         """Of all elements."""
-        elements, found = self.model.terms[0], np.zeros(len(self.model.beams.weight))
+        found = np.zeros(len(self.model.beams.weight))
         for number, group in enumerate(self.model.terms):
-            if group is not elements and group.kind.table != "actuations":
+            if number and not group.kind.strains_member:
                 continue
             load = self._loading.loads[number - 1] if number else None
             batch = GroupBatch(self.model, group, energies_of(group.kind))
@@ -488,24 +494,31 @@ class Fields:
         """The same on a plane in space: what bends about the axis in the plane across the member."""
         model = self.model
         normal = np.asarray(model.scene.contacts[touch.contact].normal, dtype=float)
-        cuts, part = model.mesh.cuts[touch.member], model.elements_of(touch.member)
         # At the border of the stretch its own element says how it is bent.
         middle = np.clip(x, np.nextafter(touch.at, 1.0), np.nextafter(float(touch.to or 1.0), 0.0))
-        at = Stations(model.element, cuts, middle)
-        e, nodal = at.elements, self.q[model.rotations.turns[part]][at.elements]
         rotation = rotations_along(model, self.state.q, touch.member, middle)
-        lengths = model.beams.weight[part].sum(axis=1)[e] * model.scales.length
-        slope = np.einsum("nj,njc->nc", at.slopes, nodal) / lengths[:, None]
-        spin = 2.0 * quaternion.multiply(quaternion.conjugate(rotation), slope)[:, 1:]
-        line, record = model.scene.center_lines[touch.member], model.scene.members[touch.member]
-        strain = np.einsum("nij,ni->nj", quaternion.matrix(line.quaternions(middle)), spin)
-        strain -= self.natural(touch.member, middle)
+        record = model.scene.members[touch.member]
+        strain = self._changes(touch.member, middle) - self.natural(touch.member, middle)
         stiffness = model.scene.sections[str(record.section)].stiffness_matrix(middle)
         frames = self._frames(touch.member, middle, rotation)
         moments = np.einsum("nij,njk,nk->ni", frames, stiffness, strain) / model.scales.moment
         axes = np.cross(normal / np.linalg.norm(normal), frames[:, :, 0])
         axes /= np.linalg.norm(axes, axis=1, keepdims=True)
         return np.einsum("ni,ni->n", moments, axes), axes
+
+    def _changes(self, member: str, x: Array) -> Array:
+        """Changes (n, 3) of twist and of the curvatures about b2 and b3, 1/m, as elements say at fractions x."""
+        model, part = self.model, self.model.elements_of(member)
+        at = self._stations(member, x)
+        nodal, line = self.q[model.rotations.turns[part]][at.elements], model.scene.center_lines[member]
+        lengths = model.beams.weight[part].sum(axis=1)[at.elements] * model.scales.length
+        slope = np.einsum("nj,njc->nc", at.slopes, nodal) / lengths[:, None]
+        if model.space:
+            rotation = rotations_along(model, self.state.q, member, x)
+            spin = 2.0 * quaternion.multiply(quaternion.conjugate(rotation), slope)[:, 1:]
+        else:
+            spin = np.pad(slope, ((0, 0), (2, 0)))
+        return np.einsum("nij,ni->nj", quaternion.matrix(line.quaternions(x)), spin)
 
     def _frames(self, member: str, x: Array, rotation: Array) -> Array:
         """Section axes as columns, (n, 3, 3)."""
@@ -587,6 +600,44 @@ class Fields:
             return ""
         found = f"{worst!r} by {superelements[worst]:.2g} of its length or rad, accepted: up to {LARGE:g}"
         return f"{found}, and to be accurate a few percent; make it flexible"
+
+    def beyond_laws(self) -> tuple[str, ...]:
+        """Sentences on members that bend further than the law of their section is known, or where it is not convex.
+
+        Looked for at the nodes of all elements and between them.
+        """
+        model, scene, found = self.model, self.model.scene, []
+        for name in model.members:
+            law, line = law_of(scene, name), scene.center_lines[name]
+            if law is None:
+                continue
+            section = scene.sections[str(scene.members[name].section)]
+            nodes = model.along(name)
+            x = np.sort(np.concatenate([nodes, 0.5 * (nodes[1:] + nodes[:-1])]))
+            change = self.along(name, x)["curvature"] - line.curvatures(x)
+            low, high = law.reach(section, x).T
+            bent = change[:, law.form.about - 1] if law.form.about else np.hypot(change[:, 1], change[:, 2])
+            over = np.maximum(bent - high, low - bent)
+            i = int(np.argmax(over))
+            law_name = f"the law {law.type!r} of section {str(scene.members[name].section)!r}"
+            if over[i] > tolerances.WRITTEN * max(abs(low[i]), abs(high[i])):
+                end = high[i] if bent[i] > high[i] else low[i]
+                found.append(
+                    f"{law_name} ends at a curvature of {end:.6g} 1/m, and member {name!r} bends by {bent[i]:.6g} 1/m "
+                    f"at {x[i]:.3g} of its length: beyond the end the law is a guess, with the slope there"
+                )
+            if law.convex:
+                continue
+            axes = [0, 1, 2] if model.space else [line.bending_axis - 1]
+            least = least_stiffness(scene, name, x, change, axes)
+            i = int(np.argmin(least))
+            if least[i] < 0.0:
+                where = ", ".join(f"{entry:.4g}" for entry in change[i])
+                found.append(
+                    f"{law_name} is not convex at changes of the curvatures of ({where}) 1/m, as of member {name!r} at "
+                    f"{x[i]:.3g} of its length: a finer mesh may find other shapes there"
+                )
+        return tuple(found)
 
     def pulled(self, member: str) -> float:
         """Axial force of a small member with two ends over its transverse stiffness times its length (``12 EI / L^2``).

@@ -286,7 +286,7 @@ class _Weigher:
             unit = model.scales.moment * time
             slopes = np.tile(differentiation(element.nodes).T.ravel(order="F"), (len(x), 1))
             axes = quaternion.matrix(line.quaternions(x.ravel()))
-            if self.space and section.coupling is not None:
+            if self.space and section.coupled:
                 # About the principal axes of the stiffness.
                 chosen, principal = np.linalg.eigh(section.stiffness_matrix(x.ravel()))
                 axes = axes @ principal

@@ -24,6 +24,7 @@ from .actuation import actuations_in
 from .beams import ELEMENT_DATA, Beams, Scales, beams_of, scales_of
 from .connections import connections_in, touches_in
 from .elements import Element, element_by_name
+from .laws import laws_in
 from .load_terms import loads_in
 from .loading import Loading, unit_loadings
 from .magnetism import magnets_in
@@ -44,6 +45,7 @@ __all__ = ["SOURCES", "Block", "Model", "assemble"]
 SOURCES: list[Callable[[Parts], Iterable[One]]] = [
     connections_in,
     touches_in,
+    laws_in,
     loads_in,
     actuations_in,
     magnets_in,

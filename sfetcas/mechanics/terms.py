@@ -101,6 +101,9 @@ class Term(Components, abc.ABC):
     element; before the place at its start where it has one.
     """
 
+    strains_member: ClassVar[bool] = False
+    """Whether its stored energy is part of the strain energy of the member along which it acts."""
+
     apart: ClassVar[bool] = False
     """Whether its first rotation has its moment at its first place, its second one at its second place."""
 

@@ -20,6 +20,7 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers, values_of
 from ..mathematics.constants import sparse, times
 from ..mechanics.connections import connections_of
+from ..mechanics.laws import law_of
 from ..mechanics.load_terms import spread_of
 from ..mechanics.magnetism import magnet_terms
 from ..mechanics.model import Model
@@ -188,6 +189,9 @@ class Results:
         if kind.table == "stiffness" and node in scene.nodes and scene.nodes[node].support != "free":
             raise SceneError(f"found a node that the ground holds, accepted: a free one, or compliance.{node}")
         check_answer(scene, name, STEPS if self._motion else PARAMETERS)
+        if kind.table == "members" and kind.key == "curvature" and law_of(scene, node) is not None:
+            message = "found the curvature of a member whose section has a law, accepted: its moment or its rotation"
+            raise SceneError(message)
         if set(name.selectors) - {"at"} or (name.at is not None and not kind.along):
             raise SceneError(f"found {name.text!r}, accepted: {name.bare}")
         if not self._unique and (kind.table in ("reactions", "motions") or (kind.along and kind.key in BY_FORCES)):

@@ -206,6 +206,17 @@ class _Level:
         return sum(len(part.traced.points) for part in self.stretches) * self.curve.equations.unknowns
 
 
+def _beyond_laws(level: _Level) -> tuple[str, ...]:
+    """The first points at which members bend beyond the laws of their sections."""
+    found: dict[str, str] = {}
+    for point in (point for part in level.stretches for point in part.traced.points):
+        for note in point.fields.beyond_laws():
+            found.setdefault(
+                note.partition(" 1/m")[0].partition(" at changes")[0], f"at factor {point.factor:.6g} {note}"
+            )
+    return tuple(found.values())
+
+
 class PathTracing:
     """One path with its branches, on finer and finer meshes."""
 
@@ -403,7 +414,7 @@ class PathTracing:
             unit=curve.unit,
             error_estimate=largest if np.isfinite(largest) else None,
             last=last,
-            notes=level.notes if curve.model.conservative else (*level.notes, NO_POTENTIAL),
+            notes=(*level.notes, *_beyond_laws(level), *(() if curve.model.conservative else (NO_POTENTIAL,))),
             seconds=self.seconds,
         )
 

@@ -170,14 +170,14 @@ class Program:
         expressions = self.expressions
         if not expressions.elements:
             return ca.MX(1, 0)
-        found = expressions.many(energies_of(self.model.element), expressions.elements)(*self._arguments[0])[1]
+        found = ca.MX(1, expressions.elements)
         for number, group in enumerate(self.model.terms):
-            if group.kind.table == "actuations":
-                energies = expressions.many(energies_of(group.kind), len(group.data))(*self._arguments[number])[1]
-                rows, count = group.elements, len(group.data)
-                found += times(
-                    sparse(rows, np.arange(count), np.ones(count), (expressions.elements, count)), energies.T
-                ).T
+            if number and not group.kind.strains_member:
+                continue
+            n = len(group.data)
+            energies = expressions.many(energies_of(group.kind), n)(*self._arguments[number])[1]
+            onto = sparse(group.elements, np.arange(n), np.ones(n), (expressions.elements, n)) if number else None
+            found += energies if onto is None else times(onto, energies.T).T
         return found
 
     @property

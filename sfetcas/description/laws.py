@@ -1,0 +1,683 @@
+"""Laws of sections: moments from the change of curvature by a potential per length, instead of a constant stiffness.
+
+A law says its *form* (:mod:`~sfetcas.mathematics.forms`) and the numbers of it, which are a unit of energy per
+length (J/m), a unit of curvature (1/m) and what the form needs.  The second derivative of the potential at rest is the
+stiffness of the section.
+"""
+
+from __future__ import annotations
+
+import abc
+import functools
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, Literal, final
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from .. import tolerances
+from ..errors import SceneError
+from ..mathematics.arrays import Array, numbers, values_of
+from ..mathematics.forms import BOTH, Form, hermite_of, monotone_slopes
+from ..mathematics.interpolation import gauss
+from .records import Number, Numbers, Positive, Record, listed, number, say
+
+__all__ = [
+    "Bilinear",
+    "Law",
+    "MomentTable",
+    "Plateau",
+    "Potential",
+    "RambergOsgood",
+    "Ribbon",
+    "SectionLaw",
+    "StressStrain",
+]
+
+About = Literal["b2", "b3", "both"]
+
+
+class SectionLaw(Record):
+    """Base class of the laws of sections."""
+
+    type: str
+
+    gives: ClassVar[tuple[str, ...]] = ()
+    """Stiffnesses that it says itself, so that the section must not."""
+
+    shaped: ClassVar[str] = ""
+    """Whether the section needs a shape: ``any``, the name of one, or empty where it may have none."""
+
+    convex: ClassVar[bool] = True
+    """Whether its potential is convex at every curvature."""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Stiffnesses of the section with which it begins."""
+        return ()
+
+    @property
+    @abc.abstractmethod
+    def form(self) -> Form:
+        """The form of its potential."""
+
+    @abc.abstractmethod
+    def values(self, section: Any, x: Array) -> Array:
+        """Unit of energy per length (J/m), unit of curvature (1/m), numbers of the form at fractions x, (n, 2 + size).
+
+        ``section`` is the cross-section with this law.
+        """
+
+    def stiffness(self, section: Any, values: Array, x: Array) -> Array:
+        """Stiffness matrices (n, 3, 3) at rest, N m2, with those (n, 3, 3) of the section itself given."""
+        return values
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Least and largest change of curvature for which it is given, 1/m, where that is known without a section."""
+        return -np.inf, np.inf
+
+    def reach(self, section: Any, x: Array) -> Array:
+        """Least and largest change of curvature for which it is given at fractions x, (n, 2), 1/m."""
+        return np.tile(self.span, (len(x), 1))
+
+    def check(self, section: Any) -> None:
+        """Refuse a section that it does not fit; a law that fits every one refuses none.
+
+        Raises
+        ------
+        SceneError
+            Names the key.
+        """
+
+    @property
+    def stays_in_plane(self) -> bool:
+        """Whether bending about b2 or b3 alone gives no moment about other axes."""
+        return True
+
+
+class _OneAxis(SectionLaw):
+    """A law of bending about one axis, or about both by the magnitude of the curvature."""
+
+    about: About = "b3"
+
+    @property
+    def axis(self) -> int:
+        """2, 3, or :data:`~sfetcas.mathematics.forms.BOTH`."""
+        return {"b2": 2, "b3": 3, "both": BOTH}[self.about]
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The bending stiffnesses about its axes, but for those that it gives."""
+        own = ("EI2", "EI3") if self.axis == BOTH else (f"EI{self.axis}",)
+        return tuple(name for name in own if name not in self.gives)
+
+    def _bending(self, section: Any, x: Array) -> Array:
+        """Bending stiffness about the axis at fractions x, (n,), N m2."""
+        return numbers(section.own_stiffness(x)[:, 2 if self.axis == BOTH else self.axis - 1])
+
+    def check(self, section: Any) -> None:
+        """Refuse other stiffnesses about b2 and b3 where it is about both.
+
+        Raises
+        ------
+        SceneError
+            They differ.
+        """
+        if self.axis != BOTH:
+            return
+        x = np.linspace(0.0, 1.0, 9)
+        both = values_of(section.own_stiffness(x))[:, 1:]
+        if not np.allclose(both[:, 0], both[:, 1], rtol=tolerances.WRITTEN):
+            found = f"found about = 'both' with EI2 = {both[0, 0]:g} and EI3 = {both[0, 1]:g}"
+            raise SceneError(f"{found}, accepted: the same stiffness about both axes", ("about",))
+
+
+@final
+class Bilinear(_OneAxis):
+    """Bending with one stiffness up to a moment, and a share of it beyond.
+
+    It is a potential: unloading goes back the same way.
+
+    Parameters
+    ----------
+    about : text
+        Axis of bending: ``b2``, ``b3``, or ``both`` for a round section, by the magnitude of the curvature.
+    moment : N m
+        Moment at which the stiffness changes, of either sign.
+    ratio : 1
+        Stiffness beyond over that before, above zero.
+    """
+
+    type: Literal["bilinear"] = "bilinear"
+    moment: Positive
+    ratio: Positive
+    about: About = "b3"
+
+    @model_validator(mode="after")
+    def _softens(self) -> Bilinear:
+        if self.about == "both" and self.ratio > 1.0:
+            raise SceneError(f"found {self.ratio:g} about both axes, accepted: up to 1", ("ratio",))
+        return self
+
+    @property
+    def form(self) -> Form:
+        """One number, the ratio."""
+        return Form("bilinear", self.axis)
+
+    def values(self, section: Any, x: Array) -> Array:
+        """In units of the curvature at the moment."""
+        stiffness = self._bending(section, x)
+        ones = np.ones(len(x))
+        return np.stack([self.moment**2 / stiffness, self.moment / stiffness, self.ratio * ones], axis=1)
+
+
+@final
+class RambergOsgood(_OneAxis):
+    """Bending as Ramberg and Osgood: the curvature is M/EI + alpha (M0/EI) (M/M0)^n.
+
+    Parameters
+    ----------
+    about : text
+        Axis of bending: ``b2``, ``b3``, or ``both`` for a round section, by the magnitude of the curvature.
+    moment : N m
+        The moment M0.
+    alpha : 1
+        Share of M0/EI by which the curvature at M0 is larger than M0/EI.
+    exponent : 1
+        The exponent n, above 1.
+    """
+
+    type: Literal["ramberg-osgood"] = "ramberg-osgood"
+    moment: Positive
+    alpha: Positive
+    exponent: Number
+    about: About = "b3"
+
+    @model_validator(mode="after")
+    def _grows(self) -> RambergOsgood:
+        if not 1.0 < self.exponent <= STEEPEST:
+            raise SceneError(f"found {self.exponent:g}, accepted: above 1 and up to {STEEPEST:g}", ("exponent",))
+        return self
+
+    @property
+    def form(self) -> Form:
+        """Two numbers, alpha and the exponent."""
+        return Form("ramberg_osgood", self.axis)
+
+    def values(self, section: Any, x: Array) -> Array:
+        """In units of the curvature M0/EI."""
+        stiffness, ones = self._bending(section, x), np.ones(len(x))
+        columns = [self.moment**2 / stiffness, self.moment / stiffness, self.alpha * ones, self.exponent * ones]
+        return np.stack(columns, axis=1)
+
+
+STEEPEST = 100.0
+"""Largest exponent: beyond it the power overflows, and a bilinear law says the same."""
+
+
+@final
+class Plateau(_OneAxis):
+    """Bending of a rectangle of a superelastic material: linear up to a stress, which then stays the same.
+
+    It is the loading curve of a material whose stress is E times the strain up to the plateau; unloading goes back the
+    same way.  For other shapes, and for plateaus that end, give the curve of the material (``stress-strain``).
+
+    Parameters
+    ----------
+    about : text
+        Axis of bending: ``b2`` or ``b3``.
+    stress : N/m²
+        Stress on the plateau, the same in tension and compression.
+    """
+
+    shaped: ClassVar[str] = "rectangle"
+
+    type: Literal["plateau"] = "plateau"
+    stress: Positive
+    about: Literal["b2", "b3"] = "b3"
+
+    @property
+    def form(self) -> Form:
+        """No numbers."""
+        return Form("plateau", self.axis)
+
+    def values(self, section: Any, x: Array) -> Array:
+        """In units of the curvature at which the outer fibres reach the plateau."""
+        young, *reach = section.fibres(x).T
+        bent = self.stress / (young * reach[self.axis - 2])
+        return np.stack([self._bending(section, x) * bent**2, bent], axis=1)
+
+
+def _signed(curvature: tuple[float, ...], values: tuple[float, ...], names: tuple[str, str]) -> bool:
+    """Check the knots of a curve through zero: rising, with zero among them; whether they begin there."""
+    if len(curvature) != len(values):
+        found = f"found {len(values)} entries beside {len(curvature)} of {names[0]!r}"
+        raise SceneError(f"{found}, accepted: one for each", (names[1],))
+    odd = curvature[0] == 0.0
+    if len(curvature) < 2 or 0.0 not in curvature or (not odd and len(curvature) < 3):
+        found = f"found {say(curvature)}"
+        raise SceneError(f"{found}, accepted: two or more numbers from 0 on, or of both signs with 0", (names[0],))
+    if values[curvature.index(0.0)] != 0.0:
+        raise SceneError(f"found {values[curvature.index(0.0)]:g} at 0, accepted: 0 there", (names[1],))
+    for name, given in zip(names, (curvature, values), strict=True):
+        for before, after in pairwise(given):
+            if after <= before:
+                raise SceneError(f"found {after:g} after {before:g}, accepted: rising numbers", (name,))
+    return odd
+
+
+@final
+class MomentTable(_OneAxis):
+    """Bending moments at given changes of the curvature, with smooth monotone cubics between.
+
+    The section says the other stiffnesses; that about the axis of the table is its slope at zero.
+
+    Parameters
+    ----------
+    about : text
+        Axis of bending: ``b2``, ``b3``, or ``both`` for a round section, by the magnitude of the curvature.
+    curvature : (m,), 1/m
+        Changes of the curvature, rising: from 0 on, where moments of the other sign are opposite, or of both signs
+        with 0 among them.
+    moment : (m,), N m
+        The moments there, rising, 0 at 0.
+    """
+
+    type: Literal["table"] = "table"
+    curvature: Numbers
+    moment: Numbers
+    about: About = "b3"
+
+    @model_validator(mode="after")
+    def _monotone(self) -> MomentTable:
+        odd = _signed(self.curvature, self.moment, ("curvature", "moment"))
+        if self.about == "both" and not odd:
+            raise SceneError("found curvatures of both signs about both axes, accepted: from 0 on", ("curvature",))
+        return self
+
+    @property
+    def gives(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The bending stiffness about its axis."""
+        return ("EI2", "EI3") if self.about == "both" else (f"EI{self.axis}",)
+
+    @property
+    def form(self) -> Form:
+        """Knots, moments and slopes."""
+        return Form("table", self.axis, len(self.curvature), values_of(self.curvature[0]) == 0.0)
+
+    def _curve(self) -> tuple[Array, Array, Array]:
+        """Knots (1/m), moments (N m) and slopes (N m2)."""
+        x, y = numbers(list(self.curvature)), numbers(list(self.moment))
+        if self.form.odd:
+            # The curve of the other sign makes the slope at zero that of the first chord.
+            slopes = monotone_slopes(np.concatenate([-x[:0:-1], x]), np.concatenate([-y[:0:-1], y]))
+            return x, y, slopes[len(x) - 1 :]
+        return x, y, monotone_slopes(x, y)
+
+    def values(self, section: Any, x: Array) -> Array:
+        """In units of the largest curvature and moment."""
+        knots, moments, slopes = self._curve()
+        bent, most = (np.max(np.abs(part)) for part in (knots, moments))
+        table = hermite_of(knots / bent, moments / most, slopes * (bent / most))
+        row = np.concatenate([numbers([bent * most, bent]), table])
+        return numbers(np.broadcast_to(row, (len(x), row.shape[0])))
+
+    def stiffness(self, section: Any, values: Array, x: Array) -> Array:
+        """The slope at zero about its axis."""
+        knots, _, slopes = self._curve()
+        slope = slopes[int(np.flatnonzero(values_of(knots) == 0.0)[0])]
+        for axis in (2, 3) if self.axis == BOTH else (self.axis,):
+            where = np.zeros((3, 3))
+            where[axis - 1, axis - 1] = 1.0
+            values = values + where * slope
+        return values
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """From the first to the last knot."""
+        knots = values_of(numbers(list(self.curvature)))
+        return (-knots[-1] if self.form.odd else knots[0]), knots[-1]
+
+
+@final
+class StressStrain(_OneAxis):
+    """Bending of a shape whose material has a given curve of stress over strain, which may differ by its sign.
+
+    The stress is integrated over the section once, with the neutral axis where the axial force is zero.
+
+    Parameters
+    ----------
+    about : text
+        Axis of bending: ``b2`` or ``b3`` of a rectangle, which needs it; ``both`` of a circle or a tube.  Default:
+        ``both``.
+    strain : (m,)
+        Strains, rising: from 0 on, where stresses of the other sign are opposite, or of both signs with 0 among them.
+    stress : (m,), N/m²
+        The stresses there, linear between, rising, 0 at 0.  The slopes beside 0 are ``E``.
+    """
+
+    shaped: ClassVar[str] = "any"
+
+    type: Literal["stress-strain"] = "stress-strain"
+    strain: Numbers
+    stress: Numbers
+    about: About | None = None  # type: ignore[assignment]
+
+    @model_validator(mode="after")
+    def _curve(self) -> StressStrain:
+        _signed(self.strain, self.stress, ("strain", "stress"))
+        return self
+
+    @property
+    def axis(self) -> int:
+        """2, 3, or :data:`~sfetcas.mathematics.forms.BOTH`, which is the default for what is round."""
+        return BOTH if self.about is None or self.about == "both" else int(self.about[1])
+
+    @property
+    def form(self) -> Form:
+        """A table of the integrated moments."""
+        return Form("table", self.axis, KNOTS)
+
+    def check(self, section: Any) -> None:
+        """Refuse another slope at zero than E, and an axis that the shape does not have.
+
+        Raises
+        ------
+        SceneError
+            Names the key.
+        """
+        young, (strain, stress) = values_of(section.fibres(np.array([0.0]))[:, 0]).item(), self.both
+        zero = int(np.flatnonzero(strain == 0.0)[0])
+        for i in (zero - 1, zero):
+            slope = (stress[i + 1] - stress[i]) / (strain[i + 1] - strain[i])
+            if abs(slope - young) > SLOPE * young:
+                message = f"found a slope of {slope:g} at zero strain, accepted: E of the section, {young:g}"
+                raise SceneError(message, ("stress",))
+        if section.shape == "rectangle" and self.about in (None, "both"):
+            raise SceneError("found a rectangle, accepted: with about = 'b2' or 'b3'", ("about",))
+        if section.shape != "rectangle" and self.about not in (None, "both"):
+            raise SceneError(f"found {self.about!r} with a {section.shape}, accepted: 'both'", ("about",))
+
+    @property
+    def both(self) -> tuple[Array, Array]:
+        """Strains and stresses of both signs."""
+        strain, stress = np.array(self.strain), np.array(self.stress)
+        if strain[0] == 0.0:
+            return np.concatenate([-strain[:0:-1], strain]), np.concatenate([-stress[:0:-1], stress])
+        return strain, stress
+
+    def values(self, section: Any, x: Array) -> Array:
+        """In units of the curvature of the end of the table, for a section with a reach of 1."""
+        if hasattr(numbers([*self.strain, *self.stress]), "expression"):
+            message = "found a number of a curve of stress over strain, accepted: one that is not integrated"
+            raise SceneError(message, ("arguments",))
+        reach = section.fibres(x)[:, 1:].T
+        reach = reach[1 if self.axis == BOTH else self.axis - 2]
+        knots, moments, slopes = self._table(section)
+        bending = self._bending(section, x)
+        bent, row = knots[-1] / reach, hermite_of(knots / knots[-1], moments / knots[-1], slopes)
+        units = np.stack([bending * bent**2, bent], axis=1)
+        return numbers(np.concatenate([units, np.broadcast_to(row, (len(x), len(row)))], axis=1))
+
+    def reach(self, section: Any, x: Array) -> Array:
+        """Where a fibre reaches the end of the curve."""
+        _, *reach = values_of(section.fibres(x)).T
+        most = self._table(section)[0][-1] / reach[1 if self.axis == BOTH else self.axis - 2]
+        return np.stack([-most, most], axis=1)
+
+    def _table(self, section: Any) -> tuple[Array, Array, Array]:
+        """Knots, moments and slopes of a section with reach 1, E = 1 and second moment 1."""
+        ratio = 0.0
+        if section.shape == "tube":
+            outer, inner = (values_of(part) for part in section.radii(np.array([0.0, 0.5, 1.0])))
+            ratio = float(inner[0] / outer[0])
+            if not np.allclose(inner / outer, ratio, rtol=tolerances.WRITTEN):
+                message = "found a tube whose inner radius is not everywhere the same share of the outer one"
+                raise SceneError(f"{message}, accepted: one share with the law 'stress-strain'", ("law",))
+        strain, stress = self.both
+        return _integrated(tuple(strain), tuple(stress), section.shape == "rectangle", ratio)
+
+
+SLOPE = 1e-3
+"""Relative difference of the slope of a curve at zero from E that is taken as rounding of what was written."""
+
+KNOTS = 64
+"""Knots of the table of an integrated curve: the cubics between leave a relative error of 1e-7 of the moment."""
+
+
+@functools.lru_cache(maxsize=64)
+def _integrated(
+    strain: tuple[float, ...], stress: tuple[float, ...], rectangle: bool, ratio: float
+) -> tuple[Array, Array, Array]:
+    """Curvatures, moments and slopes (KNOTS,) of a section of reach 1, E = 1 and second moment 1.
+
+    The stress of a fibre at the height ``y`` in [-1, 1] is that at the strain ``e + k y``, ``e`` such that the
+    resultant vanishes.
+    """
+    return _integrate(np.array(strain), np.array(stress), rectangle, ratio)
+
+
+def _integrate(strain: Array, stress: Array, rectangle: bool, ratio: float) -> tuple[Array, Array, Array]:
+    from scipy.optimize import brentq
+
+    zero = int(np.flatnonzero(strain == 0.0)[0])
+    stress = stress / ((stress[zero + 1] - stress[zero]) / (strain[zero + 1] - strain[zero]))
+    slopes = np.diff(stress) / np.diff(strain)
+    points, weights = gauss(24)
+    second = 2.0 / 3.0 if rectangle else np.pi / 8.0 * (1.0 - ratio**4)
+
+    def summed(function: Callable[[Array], Array], kinks: Array, radius: float) -> Array:
+        """Integral over the section within a radius, on pieces without kinks."""
+        inside = np.clip(kinks / radius, -1.0, 1.0)
+        edges = np.unique([-1.0, *inside, 1.0])
+        if not rectangle:
+            edges = np.arcsin(edges)
+        at = (edges[:-1, None] + np.diff(edges)[:, None] * points).ravel()
+        share = (np.diff(edges)[:, None] * weights).ravel()
+        y, width = (at, 1.0) if rectangle else (np.sin(at), np.cos(at) ** 2 * radius)
+        return np.asarray((function(y * radius) * width * share * radius).sum(axis=-1))
+
+    def moments(e: float, k: float) -> Array:
+        """Resultant and moment, then the first derivatives of both by e and of the moment by k."""
+
+        def integrand(y: Array) -> Array:
+            at = e + k * y
+            piece = np.clip(np.searchsorted(strain, at) - 1, 0, len(slopes) - 1)
+            here, steep = stress[piece] + slopes[piece] * (at - strain[piece]), slopes[piece]
+            return np.stack([here, here * y, steep, steep * y, steep * y**2])
+
+        kinks = (strain - e) / k
+        found = summed(integrand, kinks, 1.0)
+        return found if not ratio else found - summed(integrand, kinks, ratio)
+
+    def neutral(k: float) -> float:
+        if np.allclose(strain, -strain[::-1]) and np.allclose(stress, -stress[::-1]):
+            return 0.0
+        # Beyond its ends the curve goes on with its slopes there, so that there is a neutral axis.
+        low, high = strain[0] - k, strain[-1] + k
+        return float(brentq(lambda e: moments(e, k)[0], low, high, xtol=1e-15 * (high - low), rtol=8.9e-16))
+
+    # The last curvature is that at which the first fibre is at an end of the curve.
+    def room(k: float) -> float:
+        e = neutral(k)
+        return float(min(strain[-1] - (e + k), (e - k) - strain[0]))
+
+    most = 0.5 * (strain[-1] - strain[0])
+    last = most if room(most) >= -1e-12 * most else float(brentq(room, 1e-6 * most, most, xtol=1e-14 * most))
+    first = min(strain[zero + 1], -strain[zero - 1])
+    if first < 0.999 * last:
+        knots = np.concatenate([[0.0], first * (last / first) ** np.linspace(0.0, 1.0, KNOTS - 1)])
+    else:
+        knots = np.linspace(0.0, last, KNOTS)
+    found = [np.array([0.0, 1.0])]
+    for k in knots[1:]:
+        _, moment, axial, mixed, bending = moments(neutral(k), k)
+        found.append(np.array([moment, bending - mixed**2 / axial]) / second)
+    return knots, *np.array(found).T
+
+
+@final
+class Ribbon(SectionLaw):
+    """A thin wide rectangle: bending and twist make it stretch, as Audoly and Neukirch; no more keys.
+
+    For small curvatures it is a plate strip of stiffness E w h^3/12 and 4 G w h^3/12, for large ones it is the
+    ribbon of Sadowsky.  Bending about the other axis stays linear.
+    """
+
+    shaped: ClassVar[str] = "rectangle"
+    convex: ClassVar[bool] = False
+
+    type: Literal["audoly-neukirch"] = "audoly-neukirch"
+
+    @property
+    def form(self) -> Form:
+        """One number, Poisson's ratio; the soft axis is chosen with the section."""
+        return Form("ribbon", 3)
+
+    def values(self, section: Any, x: Array) -> Array:
+        """In units of thickness over squared width."""
+        young, half_width, half_height = section.fibres(x).T
+        width, thick = 2.0 * half_width, 2.0 * half_height
+        bent, poisson = thick / width**2, section.nu
+        plate = young * thick**3 / (12.0 * (1.0 - poisson**2))
+        return np.stack([plate * width * bent**2, bent, poisson * np.ones(len(x))], axis=1)
+
+    def stiffness(self, section: Any, values: Array, x: Array) -> Array:
+        """With the torsion of a plate strip."""
+        young, half_width, half_height = section.fibres(x).T
+        twist = young / (2.0 * (1.0 + section.nu)) * (2.0 * half_width) * (2.0 * half_height) ** 3 / 3.0
+        where = np.zeros((3, 3))
+        where[0, 0] = 1.0
+        return values + (twist - values[:, 0, 0])[:, None, None] * where
+
+    def check(self, section: Any) -> None:
+        """Refuse what is no ribbon.
+
+        Raises
+        ------
+        SceneError
+            No Poisson's ratio, or a rectangle whose width is not at least five times its height.
+        """
+        if section.nu is None:
+            raise SceneError("the key 'nu' is missing: a ribbon needs E and nu")
+        _, width, height = values_of(section.fibres(np.linspace(0.0, 1.0, 9))).T
+        if (width < THIN * height).any():
+            found = f"found a width of {2.0 * width[0]:g} beside a height of {2.0 * height[0]:g}"
+            raise SceneError(f"{found}, accepted: a height of at most a fifth of the width")
+
+
+THIN = 5.0
+"""Least width over height of a ribbon."""
+
+
+def _potential(value: Any) -> str:
+    """A function of CasADi, or one of Python that makes an expression, as a text."""
+    from ..mathematics.potentials import text_of
+
+    accepted = "a function of the three changes of curvature (twist, about b2, about b3) that gives one number, J/m"
+    try:
+        return text_of(value)
+    except ValueError as error:
+        raise ValueError(f"found {error.args[0] or say(value)}, accepted: {accepted}") from None
+
+
+def _parameters(value: Any) -> tuple[float, ...]:
+    return tuple(number(entry) for entry in listed(value, "a list of numbers"))
+
+
+@final
+class Potential(SectionLaw):
+    """Any potential per length of the changes of twist and of the curvatures about b2 and b3.
+
+    The section gives no stiffness beside it.
+
+    Parameters
+    ----------
+    potential : function
+        Energy per length, J/m, as a CasADi ``Function`` of the three curvatures (1/m), or of these and the parameters;
+        or a Python function that makes an expression of them.  In a file: the text that ``serialize()`` gives.
+    parameters : (m,)
+        Numbers that the function takes as its second argument, in their own units.  Default: none.
+    """
+
+    gives: ClassVar[tuple[str, ...]] = ("EI2", "EI3", "GJ")
+    convex: ClassVar[bool] = False
+
+    type: Literal["potential"] = "potential"
+    potential: Annotated[str, BeforeValidator(_potential)]
+    parameters: Annotated[tuple[float, ...], BeforeValidator(_parameters)] = ()
+
+    @model_validator(mode="after")
+    def _sound(self) -> Potential:
+        if len(self.parameters) > self._wanted or (self._wanted and not self.parameters):
+            found = f"found {len(self.parameters)} numbers, accepted: {self._wanted}, as the function takes them"
+            raise SceneError(found, ("parameters",))
+        gradient, hessian = self._at_rest()
+        if not np.isfinite([*gradient, *hessian.ravel()]).all():
+            raise SceneError("found one that has no two derivatives at rest, accepted: a smooth one", ("potential",))
+        lowest = float(np.linalg.eigvalsh(hessian)[0])
+        if lowest <= tolerances.RANK * np.abs(hessian).max():
+            found = f"found second derivatives at curvature 0 with an eigenvalue of {lowest:g} N m2"
+            raise SceneError(f"{found}, accepted: a potential that is convex there", ("potential",))
+        # A moment that would bend by less than nothing beside one radian per metre is rounding.
+        if np.abs(gradient).max() > tolerances.DECIMAL * np.abs(hessian).max():
+            found = f"found moments of {say(gradient.tolist())} N m at curvature 0"
+            message = f"{found}, accepted: none; a natural curvature belongs to the member's shape"
+            raise SceneError(message, ("potential",))
+        return self
+
+    @property
+    def _wanted(self) -> int:
+        from ..mathematics.potentials import parameters_of
+
+        return parameters_of(self.potential)
+
+    @property
+    def form(self) -> Form:
+        """The function, its parameters as numbers."""
+        return Form("given", 3, self._wanted, given=self.potential)
+
+    def _padded(self) -> Array:
+        """The parameters, then zeros for those that the function does not use."""
+        given = numbers(list(self.parameters))
+        return numbers(np.concatenate([given, np.zeros(self._wanted - len(self.parameters))]))
+
+    def _at_rest(self) -> tuple[Array, Array]:
+        """Gradient (3,), N m, and second derivatives (3, 3), N m2, at rest."""
+        from ..mathematics.potentials import at_rest
+
+        return at_rest(self.potential, self._padded())
+
+    def values(self, section: Any, x: Array) -> Array:
+        """In SI units."""
+        row = np.concatenate([np.ones(2), self._padded()])
+        return numbers(np.broadcast_to(row, (len(x), row.shape[0])))
+
+    def stiffness(self, section: Any, values: Array, x: Array) -> Array:
+        """The second derivatives at rest."""
+        return np.tile(self._at_rest()[1], (len(x), 1, 1))
+
+    @property
+    def stays_in_plane(self) -> bool:
+        """Whether bending about b3 alone, and about b2 alone, gives no moment about other axes, tried at some."""
+        from ..mathematics.potentials import derivatives_of
+
+        derivatives, p = derivatives_of(self.form), values_of(self._padded())
+        rest = values_of(self._at_rest()[1])
+        for axis in (1, 2):
+            for k in np.outer([1e-3, 1.0, 1e3], [-1.0, -0.37, 0.61]).ravel():
+                x = np.zeros(3)
+                x[axis] = k
+                found = derivatives(x, p)[1].full().ravel() + rest @ x
+                if np.abs(np.delete(found, axis)).max() > tolerances.DECIMAL * np.abs(found).max():
+                    return False
+        return True
+
+
+Law = Annotated[
+    Bilinear | RambergOsgood | Plateau | MomentTable | StressStrain | Ribbon | Potential,
+    Field(discriminator="type"),
+]
+"""A law of a section, told apart by its ``type``."""

@@ -1,0 +1,200 @@
+"""Laws of sections as terms: what their potentials are more, or less, than the quadratic one at rest.
+
+An element has the stiffness of its section at rest.  Where that has a law, a term along the element adds
+
+    sum over the points  weight length d(kappa),      d(kappa) = W(kappa) - 1/2 kappa.C kappa,
+
+with the changes of the curvature ``kappa`` about the axes of the section, which are those of the element itself.  In
+numbers ``kappa`` is over a unit of curvature of the law, and ``d`` over its unit of energy per length.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, ClassVar, final
+
+import casadi as ca
+import numpy as np
+
+from .. import tolerances
+from ..description.laws import SectionLaw
+from ..description.scene import Scene
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array, numbers
+from ..mathematics.forms import Form
+from ..mathematics.potentials import derivatives_of, deviation
+from .elements import element_by_name
+from .parts import Parts
+from .terms import One, Side, Term, name_of
+
+__all__ = ["AlongElement", "curvature_by_moment", "law_of", "laws_in", "least_stiffness"]
+
+PLACE = 10
+"""Numbers of a point in space before those of the form: energy, nine of the axes over the unit of curvature."""
+
+
+@final
+@dataclass(frozen=True)
+class AlongElement(Term):
+    """The deviation of a law from its stiffness at rest, along an element.
+
+    Data of each point: weight times length times the unit of energy; one over length and the unit of curvature, times
+    the axes b1, b2, b3 in the undeformed scene (in space), or the sign of the axis about which it bends (in the plane);
+    the numbers of the form.
+
+    Attributes
+    ----------
+    nodes : int
+        Nodes of the element.
+    gauss : bool
+        Whether the element integrates at Gauss points.
+    axis : int
+        In the plane the axis of the section that is along z: 2 or 3; in space 0.
+    form : Form
+    """
+
+    along_element: ClassVar[bool] = True
+    strains_member: ClassVar[bool] = True
+
+    nodes: int
+    gauss: bool
+    axis: int
+    form: Form
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """The rotations of the element; data of its points."""
+        return self.nodes, 0, 0, self.nodes * self.width, 0
+
+    @property
+    def width(self) -> int:
+        """Numbers of one point."""
+        return (PLACE if self.space else 2) + self.form.size
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Sum over the points."""
+        points = ca.reshape(data, self.width, self.nodes)
+        bent = self._element.changes(q)
+        return sum((self._at(bent[k], points[:, k]) for k in range(self.nodes)), ca.SX(0))
+
+    def bending(self, bent: ca.SX, point: ca.SX) -> ca.SX:
+        """Change of twist and curvatures (3,) over the unit of curvature, from that times length in the fixed axes."""
+        if self.space:
+            return ca.mtimes(ca.reshape(point[1:PLACE], 3, 3).T, bent)
+        found = ca.SX.zeros(3)
+        found[self.axis - 1] = point[1] * bent
+        return found
+
+    def _at(self, bent: ca.SX, point: ca.SX) -> ca.SX:
+        own = point[self.width - self.form.size :]
+        return point[0] * deviation(self.form, self.bending(bent, point), own)
+
+    @property
+    def _element(self) -> Any:
+        return element_by_name(f"SFET{self.nodes}", self.space, self.gauss)
+
+    @functools.cached_property
+    def changes(self) -> ca.Function:
+        """``(q, u, data) ->`` changes of twist and curvatures (3, nodes) at the points, over the unit of curvature."""
+        q, data = ca.SX.sym("q", self.components, self.nodes), ca.SX.sym("data", self.sizes[3])
+        points = ca.reshape(data, self.width, self.nodes)
+        bent = self._element.changes([ca.vertsplit(side) for side in ca.horzsplit(q)])
+        found = [self.bending(bent[k], points[:, k]) for k in range(self.nodes)]
+        nothing = ca.SX.sym("u", self.axes, 0)
+        return ca.Function(f"changes_{name_of(self)}", [q, nothing, data], [ca.densify(ca.horzcat(*found))])
+
+
+def law_of(scene: Scene, member: str) -> SectionLaw | None:
+    """The law of a member's section; None for linear ones, and members that have none."""
+    name = scene.members[member].section
+    return None if name is None else scene.sections[name].law
+
+
+def laws_in(parts: Parts) -> Iterator[One]:
+    """The terms of all elements whose sections have a law."""
+    scene, element, scales = parts.scene, parts.element, parts.scales
+    for name, first in parts.beams.first.items():
+        law = law_of(scene, name)
+        if law is None:
+            continue
+        section, line, cuts = (
+            scene.sections[str(scene.members[name].section)],
+            scene.center_lines[name],
+            parts.mesh.cuts,
+        )
+        x = cuts[name][:-1, None] + np.diff(cuts[name])[:, None] * element.points
+        count, axis = len(cuts[name]) - 1, 0 if element.space else line.bending_axis
+        kind = AlongElement(element.space, element.order + 1, element.gauss, axis, law.form)
+        values = law.values(section, x.ravel())
+        weight = parts.beams.weight[first : first + count] * scales.length
+        length = np.repeat(weight.sum(axis=1), x.shape[1])
+        frames = quaternion.matrix(line.quaternions(x.ravel()))
+        # Columns of the axes one after the other, as CasADi reads them.
+        axes = frames.transpose(0, 2, 1).reshape(-1, 9) if element.space else frames[:, 2, axis - 1 : axis]
+        data = np.concatenate(
+            [
+                (weight.ravel() * values[:, 0] / scales.moment)[:, None],
+                axes / (length * values[:, 1])[:, None],
+                values[:, 2:],
+            ],
+            axis=1,
+        ).reshape(count, -1)
+        for e in range(count):
+            turns = tuple(parts.rotations.turns[first + e].tolist())
+            yield One(kind, name, "", numbers(data[e]), turns, element=first + e)
+
+
+# -- what a law says at given places ---------------------------------------------------------------------
+
+
+def _stiffness_and_form(scene: Scene, member: str, x: Array) -> tuple[Array, Array, ca.Function]:
+    """Matrices at rest (n, 3, 3), numbers (n, 2 + size), and the derivatives of the form."""
+    section = scene.sections[str(scene.members[member].section)]
+    assert section.law is not None
+    return section.stiffness_matrix(x), section.law.values(section, x), derivatives_of(section.law.form)
+
+
+def _moment_and_slope(change: Array, rest: Array, values: Array, derivatives: ca.Function) -> tuple[Array, Array]:
+    """Moments (n, 3), N m, and their derivatives (n, 3, 3), N m2, by changes of the curvatures (n, 3), 1/m."""
+    unit, bent = values[:, 0], values[:, 1]
+    _, gradient, hessian = derivatives.map(len(change))((change / bent[:, None]).T, values[:, 2:].T)
+    moment = np.einsum("nij,nj->ni", rest, change) + gradient.full().T * (unit / bent)[:, None]
+    slope = rest + hessian.full().T.reshape(-1, 3, 3) * (unit / bent**2)[:, None, None]
+    return moment, slope
+
+
+def curvature_by_moment(scene: Scene, member: str, x: Array, moment: Array, near: Array, axes: list[int]) -> Array:
+    """Changes of the curvatures (n, 3), 1/m, at which a law gives moments (n, 3), N m, at fractions x (n,).
+
+    Newton's method from the changes ``near`` (n, 3).  ``axes`` are the numbers, from 0, of those about which the scene
+    bends.  Where it does not lead to the moments, ``near`` itself is the answer.
+    """
+    rest, values, derivatives = _stiffness_and_form(scene, member, x)
+    change = near.copy()
+    size = np.abs(moment).max(initial=0.0) + np.abs(np.einsum("nij,nj->ni", rest, near)).max(initial=0.0)
+    for _ in range(NEWTON_STEPS):
+        now, slope = _moment_and_slope(change, rest, values, derivatives)
+        miss = (moment - now)[:, axes]
+        if not np.abs(miss).max(initial=0.0) > tolerances.DECIMAL * size:
+            break
+        change[:, axes] += np.linalg.solve(slope[:, axes][:, :, axes], miss[..., None])[..., 0]
+    now = _moment_and_slope(change, rest, values, derivatives)[0]
+    met = np.abs((moment - now)[:, axes]).max(axis=1, initial=0.0) <= tolerances.WRITTEN * size
+    return np.where(met[:, None], change, near)
+
+
+NEWTON_STEPS = 30
+"""From the curvature of the elements it takes two or three."""
+
+
+def least_stiffness(scene: Scene, member: str, x: Array, change: Array, axes: list[int]) -> Array:
+    """Smallest eigenvalue (n,) of the second derivatives of the potential over those at rest.
+
+    ``change`` (n, 3) are the changes of the curvatures, 1/m, at fractions x (n,).
+    """
+    rest, values, derivatives = _stiffness_and_form(scene, member, x)
+    unit = np.sqrt(np.einsum("nii->ni", rest)[:, axes])
+    slope = _moment_and_slope(change, rest, values, derivatives)[1][:, axes][:, :, axes]
+    return np.asarray(np.linalg.eigvalsh(slope / unit[:, :, None] / unit[:, None, :])[:, 0])
