@@ -151,7 +151,9 @@ class MagneticField(Record):
             small = tolerances.WRITTEN * np.abs(slopes).max()
             if np.abs(slopes - slopes.T).max() > small or abs(np.trace(slopes)) > small:
                 accepted = "a symmetric matrix with zero trace, as of every field in air"
-                raise SceneError(f"found {say([list(row) for row in self.gradient])}, accepted: {accepted}", ("gradient",))
+                raise SceneError(
+                    f"found {say([list(row) for row in self.gradient])}, accepted: {accepted}", ("gradient",)
+                )
         return self
 
     @property
