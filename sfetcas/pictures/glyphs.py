@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import tolerances
+from ..description.actuation import Actuation, Magnet, MagneticField
 from ..description.contacts import Contact
 from ..description.loads import Load, Motion
 from ..description.obstacles import obstacle
@@ -24,8 +25,11 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from .limits import across, sketch_obstacle, sketch_slots, sketch_stops, turned_party
 from .sketch import (
+    FIELD,
     LOAD,
+    MAGNET,
     MOTION,
+    NATURAL,
     REACTION,
     Ink,
     Sketch,
@@ -47,6 +51,8 @@ SPIRAL = 0.026
 """Outer radius of the spiral of a rotational spring."""
 SHORT = 0.03
 """Springs shorter than this are not seen."""
+MAGNETS, MAGNET_ARROW = 3, 0.08
+"""Number of arrows along a magnetised member, and their length."""
 SIDES = ((0, -1), (0, 1), (-1, 0), (1, 0))
 """Where the ground is put, the first that is free: below, above, left, right."""
 TURNS = {LOAD: 0.05, REACTION: 0.063, MOTION: 0.076}
@@ -416,6 +422,75 @@ def _sketch_distributed(sketch: Sketch, name: str, load: Load, value: Array) -> 
     sketch.write_value(peak * norm(value), "N/m", ends[top], away, ink)
 
 
+def _sketch_actuation(sketch: Sketch, name: str, actuation: Actuation) -> None:
+    """A line on the side to which natural curvature bends a member, and an arrow about its axis where it is twisted."""
+    x = np.linspace(*actuation.span, 33)
+    natural = sketch.factor(actuation.history) * actuation.along(x)
+    peak = int(np.linalg.norm(natural, axis=1).argmax())
+    if not natural[peak].any():
+        return
+    found, places = sketch.step.along(actuation.member, x), sketch.along(actuation.member, x)
+    frames = quaternion.multiply(found["quaternion"], sketch.scene.center_lines[actuation.member].quaternions(x))
+    tangents, bend = quaternion.rotate(frames, np.array([1.0, 0.0, 0.0])), quaternion.rotate(frames, natural)
+    inwards = np.cross(bend, tangents)
+    most = float(np.linalg.norm(inwards, axis=1).max())
+    colour = NATURAL[int(sketch.view.angles is None and bend[peak, 2] < 0.0)]
+    ink = Ink(f"actuation-{name}", colour, 1.2)
+    away = flat_unit(sketch.view.flat(tangents[peak]), (0.0, 1.0))
+    if most > 0.0:
+        line = places + 0.4 * SYMBOL * sketch.size * inwards / most
+        sketch.line(line, ink.name, colour=colour, width=2.2, level=4.2)
+        away = flat_unit(sketch.view.flat(inwards[peak]) / most, (0.0, 1.0))
+    middle = len(x) // 2
+    if abs(natural[middle, 0]) > tolerances.NEGLIGIBLE * most:
+        one, two = across(math.copysign(1.0, natural[middle, 0]) * tangents[middle], tangents[middle])
+        angle = np.radians(np.linspace(20.0, 320.0, 50))[:, None]
+        radius = 0.8 * SYMBOL * sketch.size
+        sketch.arrow(places[middle] + radius * (np.cos(angle) * one + np.sin(angle) * two), ink)
+    sketch.label(f"{norm(natural[peak]):.3g} 1/m", places[peak], away, ink, gap=0.02)
+
+
+def _magnet_at(sketch: Sketch, magnet: Magnet) -> tuple[Array, Array]:
+    """Places (n, 3), drawn units, and directions (n, 3) of a magnet, of the length of its largest moment 1."""
+    if magnet.node is not None:
+        turned = sketch.step.quaternion(magnet.node)
+        moments = np.array(magnet.vector) if turned is None else quaternion.rotate(turned, np.array(magnet.vector))
+        return sketch.at(magnet.node)[None, :], moments[None, :] / norm(moments)
+    member, (low, high) = str(magnet.member), magnet.span
+    x = low + (high - low) * (np.arange(MAGNETS) + 0.5) / MAGNETS
+    turned = sketch.step.along(member, x)["quaternion"]
+    frames = quaternion.multiply(turned, sketch.scene.center_lines[member].quaternions(x))
+    moments = quaternion.rotate(frames, magnet.along(x))
+    return sketch.along(member, x), moments / np.linalg.norm(moments, axis=1).max()
+
+
+def _sketch_magnet(sketch: Sketch, name: str, magnet: Magnet) -> None:
+    """Arrows from south to north."""
+    ink = Ink(f"magnet-{name}", MAGNET, 2.0)
+    for place, moment in zip(*_magnet_at(sketch, magnet), strict=True):
+        half = 0.5 * MAGNET_ARROW * sketch.size * moment
+        if norm(moment) > SHORT:
+            sketch.arrow(place + np.array([-half, half]), ink)
+
+
+def _sketch_field(sketch: Sketch, name: str, field: MagneticField) -> None:
+    """Thin arrows of the field at the magnets, and its largest value there."""
+    factor = sketch.factor(field.history)
+    places = np.concatenate([_magnet_at(sketch, magnet)[0] for magnet in sketch.scene.magnets.values()])
+    values = factor * field.of(places * sketch.course.unit)
+    sizes = np.linalg.norm(values, axis=1)
+    most = float(sizes.max())
+    if most == 0.0:
+        return
+    ink = Ink(f"field-{name}", FIELD, 0.9)
+    for place, value in zip(places, values, strict=True):
+        if norm(value) > SHORT * most:
+            sketch.arrow(place + np.outer([0.0, 0.7 * ARROW * sketch.size / most], value), ink)
+    top = int(sizes.argmax())
+    end = places[top] + 0.7 * ARROW * sketch.size * values[top] / most
+    sketch.write_value(most, "T", end, flat_unit(sketch.view.flat(values[top]) / most, (0.0, 1.0)), ink)
+
+
 def _label_place(profile: Array) -> int:
     """Index of the largest value; the middle one of several."""
     largest = np.flatnonzero(profile >= profile.max() * (1.0 - 1e-9))
@@ -437,6 +512,9 @@ SUPPORTS: tuple[tuple[str, Glyph], ...] = (
 LOADS: tuple[tuple[str, Glyph], ...] = (
     ("motions", _sketch_motion),
     ("loads", _sketch_load),
+    ("actuations", _sketch_actuation),
+    ("fields", _sketch_field),
+    ("magnets", _sketch_magnet),
     ("nodes", _sketch_reaction),
     ("contacts", _sketch_pushes),
 )

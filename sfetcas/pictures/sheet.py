@@ -32,8 +32,11 @@ from .colours import ColourQuantity
 from .showing import new_figure
 from .sketch import (
     BEHIND,
+    FIELD,
     LOAD,
+    MAGNET,
     MOTION,
+    NATURAL,
     REACTION,
     REST,
     SUPPORT,
@@ -269,11 +272,14 @@ def _legend(sketch: Sketch, looks: Sequence[Look]) -> list[Any]:
     handles += said.values()
     drawn = {mark.name.partition("-")[0] for mark in sketch.marks}
     arrows = {"load": (LOAD, "load"), "reaction": (REACTION, "reaction"), "motion": (MOTION, "prescribed motion")}
+    arrows |= {"field": (FIELD, "magnetic field"), "magnet": (MAGNET, "magnet, to its north pole")}
     for name, (colour, text) in arrows.items():
         if name in drawn:
             line = Line2D([], [], color=colour, marker=">", markersize=5, label=text)
             line.set_linestyle(":" if name == "motion" else "-")
             handles.append(line)
+    if "actuation" in drawn:
+        handles.append(Line2D([], [], color=NATURAL[0], linewidth=2.2, label="natural curvature"))
     if "contact" in drawn:
         handles.append(Patch(facecolor="white", edgecolor=SUPPORT, hatch="////", linewidth=0.7, label="obstacle"))
     return handles

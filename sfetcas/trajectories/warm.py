@@ -27,9 +27,9 @@ __all__ = ["at_rest", "carried_over", "restaged", "rigid", "straight"]
 
 
 def rigid(scene: Scene) -> Scene | None:
-    """The scene with its flexible members made rigid; None where no member is flexible."""
+    """The scene with its flexible members made rigid; None where no member is flexible, or natural curvature bends some."""
     flexible = [name for name, member in scene.members.items() if member.type == "flexible"]
-    if not flexible:
+    if not flexible or scene.actuations:
         return None
     table = scene.to_dict()
     table["dimension"] = scene.resolved_dimension
