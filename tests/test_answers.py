@@ -217,7 +217,9 @@ def test_expressions_say_what_answers_say():
     """Each name that both know, of a frame in the plane and of a bent rod in space."""
     square = {"shape": "rectangle", "width": 0.03, "height": 0.02, "E": 1e6, "nu": 0.3}
     force = {"f": {"type": "force", "node": "B", "value": [0, 0.002, 0.004]}}
-    rod = beam(square, loads=force, springs={"k": {"node": "B", "stiffness": 1e-3, "axis": [0, 0, 1]}})
+    string = {"way": [{"member": "m", "offset": [0.01, 0.02]}], "tension": 0.02}
+    spring = {"node": "B", "stiffness": 1e-3, "axis": [0, 0, 1]}
+    rod = beam(square, loads=force, springs={"k": spring}, tendons={"t": string})
     met = set()
     for scene in (frame(), rod, driven("plane"), driven("space")):
         names = []

@@ -585,7 +585,7 @@ def test_optimal_control():
     problem = sfetcas.OptimalControl(scene, {"tendons.t.tension": (0, 9)}, time=1.0, intervals=10)
     problem.minimise(problem.integral(problem.control("tendons.t.tension") ** 2))
     problem.subject_to(problem.at_tf(problem.answer("nodes.B.angle")) == 0.5, name="turned")
-    found = problem.solve(replay=False)
+    found = problem.solve()
     angle = found.answer("nodes.B.angle").ravel()
     length = np.hypot(0.6 * np.cos(angle), 0.6 * np.sin(angle) - 0.5)
     pull = found.control("tendons.t.tension").ravel()

@@ -153,8 +153,9 @@ def commanded(scene: Scene, commands: Mapping[str, History]) -> Scene:
             histories[path[1]] = _table(history)
             continue
         if path[0] == "tendons":
-            histories[name] = _table(history)
-            table["tendons"][path[1]] |= {path[2]: 1.0, "history": name}
+            own = " ".join(path)
+            histories[own] = _table(history)
+            table["tendons"][path[1]] |= {path[2]: 1.0, "history": own}
             continue
         load = path[1]
         own = f"{load} {' '.join(path[2:])}"
