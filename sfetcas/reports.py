@@ -116,9 +116,13 @@ def _reactions(state: Equilibrium | MotionState) -> dict[str, tuple[Array, Array
 
 
 def _sizes(state: Equilibrium | MotionState) -> dict[str, float]:
-    """By unit what a number of this unit is compared with: the size of the scene, one radian, the largest reactions."""
+    """By unit what a number of this unit is compared with: the size of the scene, one radian, the largest reactions.
+
+    Of forces also the tensions of tendons, which may pull on what needs no support.
+    """
     reactions = list(_reactions(state).values())
     force, moment = (max((float(np.abs(one[i]).max()) for one in reactions), default=0.0) for i in (0, 1))
+    force = max([force, *(abs(state.tendon(name)["tension"]) for name in state.model.scene.tendons)])
     length = state.model.scales.length
     return {"m": length, "rad": 1.0, "N": max(force, moment / length), "N m": max(moment, force * length)}
 
@@ -163,6 +167,7 @@ def _floats(motion: Trajectory) -> bool:
         spring.to is None if spring.type == "translational" else not spring.between or "ground" in spring.between
         for spring in scene.springs.values()
     )
+    grounded = grounded or any(way.ground is not None for tendon in scene.tendons.values() for way in tendon.way)
     return not grounded and all(node.support == "free" for node in scene.nodes.values())
 
 

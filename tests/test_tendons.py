@@ -314,6 +314,127 @@ def test_discs_tend_to_the_way_along(dimension):
     assert np.log2(missed[0] / missed[1]) == pytest.approx(2.0, abs=0.05)
 
 
+# -- a finger ------------------------------------------------------------------------------------------
+
+PHALANGES = (0.045, 0.028, 0.02)
+JOINT = 0.02
+"""Stiffness of the springs in the hinges, N m."""
+HOLES = (0.25, 0.8)
+"""Where each phalanx has an eyelet, 6 mm from its axis."""
+
+
+def finger(dimension="plane", **pull):
+    """Three rigid phalanges on hinges with springs, and a tendon from the ground through two eyelets of each."""
+    x = np.concatenate([[0.0], np.cumsum(PHALANGES)])
+    names = ["p0", "p1", "p2"]
+    nodes = {f"n{i}": {"position": [float(at), 0.0, 0.0], "joint": "hinge"} for i, at in enumerate(x)}
+    nodes["n0"] |= {"support": "hinge", "joint": "rigid"}
+    nodes["n3"] |= {"joint": "rigid"}
+    between = [["ground", "p0"], ["p0", "p1"], ["p1", "p2"]]
+    springs = {f"k{i}": {"node": f"n{i}", "stiffness": JOINT, "between": pair} for i, pair in enumerate(between)}
+    way = [{"ground": [-0.02, 0.006]}, *({"member": name, "offset": 0.006, "discs": list(HOLES)} for name in names)]
+    return Scene.from_dict(
+        {
+            "dimension": dimension,
+            "sections": {"s": {"EI3": 1.0, "EI2": 1.0, "GJ": 1.0}},
+            "nodes": nodes,
+            "members": {n: {"nodes": [f"n{i}", f"n{i + 1}"], "type": "rigid"} for i, n in enumerate(names)},
+            "springs": springs,
+            "tendons": {"t": {"way": way, **pull}},
+        }
+    )
+
+
+def eyelets(angles):
+    """Places (7, 2) along the way, and of the joints (4, 2), by the relative angles of the hinges."""
+    places, joints, total = [np.array([-0.02, 0.006])], [np.zeros(2)], 0.0
+    for angle, length in zip(angles, PHALANGES, strict=True):
+        total += angle
+        along, across = np.array([np.cos(total), np.sin(total)]), np.array([-np.sin(total), np.cos(total)])
+        places += [joints[-1] + at * length * along + 0.006 * across for at in HOLES]
+        joints.append(joints[-1] + length * along)
+    return np.array(places), np.array(joints)
+
+
+def strings(angles):
+    """Length of the way."""
+    return np.linalg.norm(np.diff(eyelets(angles)[0], axis=0), axis=1).sum()
+
+
+def bent_finger(tension):
+    """Angles of the hinges by the balance of work: stiffness times angle = - tension times change of length."""
+
+    def missing(angles, h=1e-6):
+        steps = h * np.eye(3)
+        pulled = np.array([(strings(angles + s) - strings(angles - s)) / (2.0 * h) for s in steps])
+        return JOINT * angles + tension * pulled
+
+    return root(missing, np.zeros(3), tol=1e-13).x
+
+
+@DIMENSIONS
+def test_finger(dimension):
+    """Angles, lengths, and what a phalanx carries: all that pulls beyond the cut, the tendon's own force left out."""
+    angles = bent_finger(2.0)
+    places, joints = eyelets(angles)
+    step = sfetcas.solve(finger(dimension, tension=2.0)).last
+    # The derivatives of the lengths are differences, exact to 1e-10.
+    for i, angle in enumerate(angles):
+        assert step.spring(f"k{i}").travel == pytest.approx(angle, abs=1e-8)
+    np.testing.assert_allclose(step.position("n3")[:2], joints[-1], atol=1e-9)
+    assert step.tendon("t")["length"] == pytest.approx(strings(angles), abs=1e-10)
+    units = np.diff(places, axis=0)
+    units /= np.linalg.norm(units, axis=1, keepdims=True)
+    for name, at, first in (
+        ("p0", 0.1, 0),
+        ("p0", 0.5, 1),
+        ("p0", 0.9, 2),
+        ("p1", 0.5, 3),
+        ("p2", 0.5, 5),
+        ("p2", 0.9, 6),
+    ):
+        found = step.along(name, [at])
+        # The string at the cut pulls what is beyond it back; without string there nothing does.
+        pull = -2.0 * units[first] if first < 6 else np.zeros(2)
+        np.testing.assert_allclose(found["force"][0, :2], pull, atol=1e-8)
+        arm = places[min(first, 6)] - found["position"][0, :2]
+        np.testing.assert_allclose(found["moment"][0, 2], arm[0] * pull[1] - arm[1] * pull[0], atol=1e-10)
+    force, moment = step.reaction("n0")
+    np.testing.assert_allclose(force[:2], -2.0 * -units[0], atol=1e-8)
+    np.testing.assert_allclose(moment, 0.0, atol=1e-10)
+
+
+@DIMENSIONS
+def test_pulled_finger(dimension):
+    """A given shortening needs the tension that gives this shortening."""
+    pull = strings(np.zeros(3)) - strings(bent_finger(2.0))
+    assert sfetcas.solve(finger(dimension, pull=float(pull))).last.tendon("t")["tension"] == pytest.approx(
+        2.0, abs=1e-6
+    )
+
+
+@DIMENSIONS
+def test_rigid_member_with_a_tendon_along_it(dimension):
+    """A rigid bar is pressed by the tendon along it, and bent by its distance."""
+    scene = rod(dimension=dimension, tension=T).to_dict()
+    scene["members"]["m"]["type"] = "rigid"
+    scene["nodes"]["A"]["support"] = "hinge"
+    scene["springs"] = {"k": {"node": "A", "stiffness": 1.0}}
+    scene["tendons"]["t"]["way"] = [{"ground": [-0.5, 0.5]}, {"member": "m", "offset": D}]
+    scene["loads"] = {"f": {"type": "force", "node": "B", "value": [0.0, 0.3]}}
+    step = sfetcas.solve(Scene.from_dict(scene)).last
+    angle = np.arctan2(*step.position("B")[1::-1])
+    along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    hole = D * across
+    pull = T * (np.array([-0.5, 0.5]) - hole) / np.linalg.norm(np.array([-0.5, 0.5]) - hole)
+    # About the hinge: the spring, the load, and the piece to the ground.
+    assert angle == pytest.approx(0.3 * along[0] + hole[0] * pull[1] - hole[1] * pull[0], abs=1e-9)
+    found = step.along("m", [0.4])
+    np.testing.assert_allclose(found["force"][0, :2], [0.0, 0.3] - T * along, atol=1e-9)
+    assert found["moment"][0, 2] == pytest.approx(0.3 * 0.6 * along[0] + T * D, abs=1e-9)
+    assert step.tendon("t")["length"] == pytest.approx(1.0 + np.linalg.norm(np.array([-0.5, 0.5]) - hole), abs=1e-9)
+
+
 # -- every analysis ------------------------------------------------------------------------------------
 
 
@@ -464,7 +585,7 @@ def test_optimal_control():
     problem = sfetcas.OptimalControl(scene, {"tendons.t.tension": (0, 9)}, time=1.0, intervals=10)
     problem.minimise(problem.integral(problem.control("tendons.t.tension") ** 2))
     problem.subject_to(problem.at_tf(problem.answer("nodes.B.angle")) == 0.5, name="turned")
-    found = problem.solve(replay=False)
+    found = problem.solve()
     angle = found.answer("nodes.B.angle").ravel()
     length = np.hypot(0.6 * np.cos(angle), 0.6 * np.sin(angle) - 0.5)
     pull = found.control("tendons.t.tension").ravel()

@@ -159,7 +159,7 @@ contacts.NAME.force | N | x y z | statics | on the member; of a stretch its resu
 contacts.NAME.at | | | statics | fraction of the length, or [from, to]; null where nothing touches
 contacts.NAME.gap | m | | statics | smallest distance
 contacts.NAME.member | | | statics | which it touches; all four are lists where it touches more than once
-energy.elastic | J | | all | of members and springs
+energy.elastic | J | | all | of members, springs and tendons
 energy.loads | J | | statics, motion, parameters | from the undeformed scene
 energy.total | J | | statics, motion, parameters | sum of all that there are
 energy.potential | J | | statics, parameters | another name of the total of an equilibrium

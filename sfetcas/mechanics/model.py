@@ -364,6 +364,6 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         blocks.append(Block("closings", len(model.positions.rows), f"{why}; the multipliers are forces"))
     for group in model.connections:
         if group.rows:
-            name = type(group.kind).__name__.lower()
-            blocks.append(Block(f"{name} rows", len(group.rows), enumerated(group.names)))
+            name = type(group.kind).__name__.lower() if not group.kind.shares_row else "length of tendon"
+            blocks.append(Block(f"{name} rows", len(group.rows), enumerated(tuple(dict.fromkeys(group.names)))))
     return tuple(blocks)

@@ -1,4 +1,4 @@
-"""Symbols of supports, joints, springs, motions, loads and reactions, put to a sketch.
+"""Symbols of supports, joints, springs, tendons, motions, loads and reactions, put to a sketch.
 
 What comes first has the free choice of place.
 """
@@ -21,6 +21,7 @@ from ..description.sections import evaluate
 from ..description.springs import Spring
 from ..description.structure import SLIDING, Member, Node, unit
 from ..description.supports import turned_about
+from ..description.tendons import Hole, Stretch, Tendon, tangent
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from .limits import across, sketch_obstacle, sketch_slots, sketch_stops, turned_party
@@ -47,6 +48,7 @@ ARROW = 0.12
 """Length of the longest arrow over the size of the picture; sizes below are shares of it, too."""
 SYMBOL = 0.03
 SPRING = "#5A5A5A"
+TENDON = "#8C4A9E"
 SPIRAL = 0.026
 """Outer radius of the spiral of a rotational spring."""
 SHORT = 0.03
@@ -66,7 +68,7 @@ def sketch_all(sketch: Sketch) -> None:
 
 
 def sketch_supports(sketch: Sketch) -> None:
-    """Add symbols of obstacles, supports, joints and springs to a sketch."""
+    """Add symbols of obstacles, supports, joints, springs and tendons to a sketch."""
     _sketch_tables(sketch, SUPPORTS)
 
 
@@ -282,6 +284,40 @@ def _anchor(sketch: Sketch, spring: Spring, end: Array) -> Array:
     if norm(place - end) >= SHORT * sketch.size:
         return place
     return np.asarray(end + length * sketch.view.raised(_below(sketch, spring.node, SIDES)))
+
+
+# Tendons
+
+
+def _sketch_tendon(sketch: Sketch, name: str, tendon: Tendon) -> None:
+    """A line along the way, and what carries each hole; thin where the tendon is slack."""
+    width = 0.7 if sketch.step.tendon(name).get("slack") else 1.4
+    for piece in sketch.scene.tendon_pieces[name]:
+        if isinstance(piece, Stretch):
+            line = sketch.scene.center_lines[piece.member]
+            x = np.linspace(piece.start, piece.end, 97)
+            arms = tangent(piece.way, line, x, x)[1] / sketch.course.unit
+            turned = quaternion.rotate(sketch.step.along(piece.member, x)["quaternion"], arms)
+            sketch.line(sketch.along(piece.member, x) + turned, f"tendon-{name}", colour=TENDON, width=width, level=6.5)
+            continue
+        arms = np.array([_arm(sketch, hole) for hole in piece])
+        sketch.line(arms[:, 1], f"tendon-{name}", colour=TENDON, width=width, level=6.5)
+        for arm in arms:
+            if norm(arm[1] - arm[0]) > 0.0:
+                sketch.line(arm, f"hole-{name}", colour=SPRING, width=0.7, level=4.5)
+
+
+def _arm(sketch: Sketch, hole: Hole) -> Array:
+    """What a hole is fixed to, and where it is in the picture, (2, 3)."""
+    x, turned = np.array([hole.at]), None
+    if hole.member is not None:
+        turned, base = sketch.step.along(hole.member, x)["quaternion"][0], sketch.along(hole.member, x)[0]
+    elif hole.node is not None:
+        turned, base = sketch.step.quaternion(hole.node), sketch.at(hole.node)
+    else:
+        base = hole.position / sketch.course.unit
+    arm = hole.arm if turned is None else quaternion.rotate(turned, hole.arm)
+    return np.asarray(base + np.outer([0.0, 1.0], arm / sketch.course.unit))
 
 
 # Motions, loads and reactions
@@ -506,6 +542,7 @@ SUPPORTS: tuple[tuple[str, Glyph], ...] = (
     ("members", _sketch_release),
     ("members", sketch_slots),
     ("springs", _sketch_spring),
+    ("tendons", _sketch_tendon),
 )
 """Glyphs of what holds a structure, by the tables of the scene: all that a new kind of record needs for a picture."""
 

@@ -154,8 +154,9 @@ def commanded(scene: Scene, commands: Mapping[str, History]) -> Scene:
             histories[path[1]] = _table(history)
             continue
         if path[0] == "tendons":
-            histories[name] = _table(history)
-            table["tendons"][path[1]] |= {path[2]: 1.0, "history": name}
+            own = " ".join(path)
+            histories[own] = _table(history)
+            table["tendons"][path[1]] |= {path[2]: 1.0, "history": own}
             continue
         load, loads = path[1], table[path[0]]
         own = f"{load} {' '.join(path[2:])}"
