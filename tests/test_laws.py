@@ -272,6 +272,31 @@ def test_parameters_of_data(law, name):
         assert angles[1]["nodes.B.angle"] == pytest.approx(k, abs=1e-6)
 
 
+def test_bending_stiffness_as_parameter_of_shapes():
+    """Dimensions of a shape move its law with them."""
+    one = scene(section={**FLAT, "law": {"type": "plateau", "stress": STRESS}}, load=BENDING)
+    family = sfetcas.parametric(one, ["sections.s.height"], ["nodes.B.angle"])
+    found = family.solve({"sections.s.height": 1.1 * HEIGHT})["nodes.B.angle"]
+    start = 2.0 * STRESS / (E * 1.1 * HEIGHT)
+    most = WIDTH * (1.1 * HEIGHT) ** 2 / 4.0 * STRESS
+    assert found == pytest.approx(start / np.sqrt(3.0 * (1.0 - BENDING["value"] / most)), rel=1e-6)
+
+
+def test_following_load_beside_a_law():
+    """Moments by balance of a member that both a law and a distributed follower act along: none at the free end."""
+    press = {"press": {"type": "distributed", "member": "beam", "value": [0, 2.0], "frame": "follower"}}
+    found = sfetcas.solve(scene(RAMBERG, loads=press)).last
+    x = np.linspace(0.0, 1.0, 5)
+    along = found.fields.along("beam", x)
+    np.testing.assert_allclose(along["moment"][-1], 0.0, atol=1e-9)
+    np.testing.assert_allclose(along["moment"][0], -found.reaction("A")[1], atol=1e-9)
+    expected = [curvature_of(RAMBERG, m) for m in along["moment"][:, 2]]
+    np.testing.assert_allclose(along["curvature"][:, 2], expected, atol=1e-9)
+    family = sfetcas.parametric(scene(RAMBERG, loads=press), ["sections.s.EI3"], ["members.beam.moment at 0.5"])
+    moment = np.ravel(family.solve()["members.beam.moment at 0.5"])
+    np.testing.assert_allclose(moment, along["moment"][2], atol=1e-5)
+
+
 def test_design():
     """The moment at which the strip softens such that its end turns by three radians."""
     found = sfetcas.find(scene(BILINEAR), {"sections.s.law.moment": (0.5, 1.4)}, {"nodes.B.angle": 3.0})
@@ -371,6 +396,7 @@ def test_plateau():
             assert told(section, k) == pytest.approx(ideal, rel=1e-12)
 
 
+BENDING = {"type": "moment", "node": "B", "value": 2.2}
 CURVE = [-0.06, -0.01, 0.0, 0.008, 0.05], [-9e8, -7e8, 0.0, 5.6e8, 6e8]
 
 

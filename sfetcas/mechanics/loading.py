@@ -320,7 +320,7 @@ class _Writer:
         forces = plus(np.zeros((*self.beams.weight.shape, self.element.axes)), part, along)
         if follows:
             for i, turned in enumerate(self.connections):
-                if turned.kind.along_element:
+                if turned.kind.along_element and turned.kind.follows:
                     group.load(i, slice(None), forces[turned.elements].reshape(len(turned.data), -1))
             return
         pull, on_places = carried(forces, self.segments, self.element)

@@ -110,7 +110,8 @@ class Argument:
         """Least and largest accepted value: the range; else above zero for sections, from zero for a tension."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
-        signed = ".polynomial" in self.name or ".coupling" in self.name
+        entry = ".law." in self.name and (self.components is not None or self.name[-1].isdigit())
+        signed = entry or ".polynomial" in self.name or ".coupling" in self.name
         if self.name.startswith("sections.") and not signed:
             return float(np.nextafter(0.0, 1.0)), np.inf
         return (0.0 if self.name.endswith(NOT_NEGATIVE) else -np.inf), np.inf
@@ -391,6 +392,14 @@ UNITS = {
 }
 """Units of numbers by their keys."""
 
+LAW_UNITS = {
+    "moment": "N m",
+    "curvature": "1/m",
+    "stress": "Pa",
+    **dict.fromkeys(("ratio", "alpha", "exponent", "strain"), "1"),
+}
+"""Units of the numbers of laws of sections."""
+
 
 def _unit(scene: Scene, path: Sequence[str]) -> str:
     key = next((part for part in reversed(path) if not part.isdigit()), "")
@@ -410,6 +419,8 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
             return "N"
         if key == "shear_factor":
             return "1"
+        if "law" in path[2:]:
+            return LAW_UNITS.get(key, "as in the scene")
         return UNITS.get(key, "m")
     return UNITS.get(key, "as in the scene")
 
