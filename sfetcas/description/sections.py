@@ -187,10 +187,6 @@ def _not_negative(varying: Quantity) -> Quantity:
     return _bounded(varying, "zero or a number above zero", zero=True)
 
 
-def _zero_or_above(varying: Quantity) -> Quantity:
-    return varying if isinstance(varying, float) and varying == 0.0 else _above_zero(varying)
-
-
 def _three(value: Any) -> tuple[Any, ...]:
     if isinstance(value, (str, Mapping)) or not isinstance(value, Iterable):
         raise ValueError(f"found {say(value)}, accepted: three numbers, about b1, b2 and b3")
@@ -213,7 +209,6 @@ def _share(value: float) -> float:
 
 
 Above = Annotated[Varying, AfterValidator(_above_zero)]
-Weight = Annotated[Varying, AfterValidator(_zero_or_above)]
 Inertia = Annotated[Varying, AfterValidator(_not_negative)]
 
 Outline = Callable[..., tuple[Floats, Floats, Floats, Floats]]
@@ -294,8 +289,7 @@ class CrossSection(Record):
         ``GJ`` times the change of the twist plus the first entry times that of the curvature about b2 plus the
         second times that about b3, and so on.  Needs all three stiffnesses.  Default: zero.
     rhoA : kg/m
-        Mass per length, above zero.  Needed with gravity, rotating axes, modes and motions; the number 0 says that
-        the member has no mass.
+        Mass per length.  Needed with gravity, rotating axes, modes and motions.
     rhoI : (3,), kg m
         Rotary inertia per length about b1, b2, b3, for modes and motions.  Default: zero.
     law : table
@@ -350,7 +344,7 @@ class CrossSection(Record):
     GA2: Above | None = None
     GA3: Above | None = None
     coupling: Annotated[tuple[Varying, Varying, Varying], BeforeValidator(_three)] | None = None
-    rhoA: Weight | None = None
+    rhoA: Above | None = None
     rhoI: Annotated[tuple[Inertia, Inertia, Inertia], BeforeValidator(_three)] | None = None
     law: Law | None = None
     damping: NotNegative = 0.0
@@ -483,11 +477,6 @@ class CrossSection(Record):
     def coupled(self) -> bool:
         """Whether the stiffness at rest is more than a diagonal of GJ, EI2 and EI3."""
         return self.coupling is not None or (self.law is not None and self.law.type == "potential")
-
-    @property
-    def weightless(self) -> bool:
-        """Whether it has no mass per length, not given or zero all along."""
-        return bool(self.missing(["rhoA"])) or (isinstance(self.rhoA, float) and self.rhoA == 0.0)
 
     def missing(self, names: Iterable[str]) -> list[str]:
         """Which of the names EI2, EI3, GJ, rhoA (N m2, kg/m) this section does not define, in the order given."""

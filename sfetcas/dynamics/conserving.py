@@ -60,12 +60,6 @@ class Conserving(Method):
             name = next(name for name, load in model.scene.loads.items() if load.frame != "fixed")
             message = "found a follower with the integrator 'conserving', accepted: loads with a potential"
             raise SceneError(message, ("loads", name))
-        for name in model.members:
-            member = model.scene.members[name]
-            if member.type == "flexible" and model.scene.sections[str(member.section)].weightless:
-                accepted = "accepted: radau-3, radau-2, generalised-alpha, or a mass"
-                message = f"found the weightless member {name!r} with the integrator 'conserving', {accepted}"
-                raise SceneError(message, ("analysis", "integrator"))
         if model.rotating_frame is not None:
             message = "found with the integrator 'conserving', accepted: radau-3, radau-2, generalised-alpha"
             raise SceneError(message, ("rotating",))
