@@ -17,7 +17,7 @@ from ..mathematics.interpolation import power_series
 from .formulas import SAMPLES, Formula
 from .records import NotNegative, Number, Numbers, Record, number, say
 
-__all__ = ["CrossSection", "Polynomial", "Quantity", "Table", "Varying", "breaks", "evaluate", "quantity"]
+__all__ = ["HEAVY", "CrossSection", "Polynomial", "Quantity", "Table", "Varying", "breaks", "evaluate", "quantity"]
 
 Floats = NDArray[np.float64]
 
@@ -203,6 +203,9 @@ def _poisson(value: float) -> float:
 Above = Annotated[Varying, AfterValidator(_above_zero)]
 Inertia = Annotated[Varying, AfterValidator(_not_negative)]
 
+HEAVY = np.linspace(0.0, 1.0, SAMPLES)
+"""Fractions of the length at which a mass is looked for."""
+
 Outline = Callable[..., tuple[Floats, Floats, Floats, Floats]]
 
 
@@ -270,7 +273,8 @@ class CrossSection(Record):
     GJ : N m²
         Torsional stiffness about the tangent b1.  Needed in space.
     rhoA : kg/m
-        Mass per length.  Needed with gravity, rotating axes, modes and motions.
+        Mass per length.  Needed with gravity, rotating axes, modes and motions; zero for a member without mass, as
+        of a light spring between heavy bodies.
     rhoI : (3,), kg m
         Rotary inertia per length about b1, b2, b3, for modes and motions.  Default: zero.
     damping : s
@@ -288,7 +292,7 @@ class CrossSection(Record):
     G : N/m²
         Shear modulus of a shape.
     rho : kg/m³
-        Density of a shape.
+        Density of a shape, or zero.
     width : m
         Of a rectangle, along b3.
     height : m
@@ -310,7 +314,7 @@ class CrossSection(Record):
     EI2: Above | None = None
     EI3: Above | None = None
     GJ: Above | None = None
-    rhoA: Above | None = None
+    rhoA: Inertia | None = None
     rhoI: Annotated[tuple[Inertia, Inertia, Inertia], BeforeValidator(_three)] | None = None
     damping: NotNegative = 0.0
     drag: NotNegative = 0.0
@@ -318,7 +322,7 @@ class CrossSection(Record):
     E: Above | None = None
     nu: Annotated[Number, AfterValidator(_poisson)] | None = None
     G: Above | None = None
-    rho: Above | None = None
+    rho: Inertia | None = None
     width: Above | None = None
     height: Above | None = None
     radius: Above | None = None
@@ -415,6 +419,12 @@ class CrossSection(Record):
             "tube": (1.0, ("outer", "outer")),
         }[self.shape or ""]
         return np.stack([self._value("E", x), *(half * self._value(name, x) for name in names)], axis=1)
+
+    @property
+    def heavy(self) -> bool:
+        """Whether it has a mass above zero somewhere."""
+        density = self.rhoA if self.shape is None else self.rho
+        return density is not None and bool(evaluate(density, HEAVY).any())
 
     def mass(self, x: ArrayLike) -> Floats:
         """Mass per length: x (n,) fractions of the length -> (n,) kg/m, nan where not known."""

@@ -106,12 +106,14 @@ class Argument:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Least and largest accepted value: the range; else above zero for sections, from zero for ``stiffness``."""
+        """Least and largest accepted value: the range; else above zero for stiffness, from zero for masses, springs."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
-        if self.name.startswith("sections.") and ".polynomial" not in self.name:
+        positive = self.name.startswith("sections.") and self.name.split(".")[2] not in NOT_NEGATIVE
+        if positive and ".polynomial" not in self.name:
             return float(np.nextafter(0.0, 1.0)), np.inf
-        return (0.0 if self.name.endswith(".stiffness") else -np.inf), np.inf
+        least = self.name.endswith(".stiffness") or (self.name.startswith("sections.") and not positive)
+        return (0.0 if least and ".polynomial" not in self.name else -np.inf), np.inf
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -120,6 +122,9 @@ class Argument:
             return (self.name,)
         return tuple(f"{self.name}.{i}" for i in self.components)
 
+
+NOT_NEGATIVE = ("rhoA", "rhoI", "rho", "damping", "drag")
+"""Keys of sections whose numbers may be zero."""
 
 Asked = Sequence[str] | Mapping[str, tuple[float, float] | Parameter | None] | None
 """Names of numbers, or a mapping of them to ranges (None: no range) or :class:`Parameter`; None: defaults."""
