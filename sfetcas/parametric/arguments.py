@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from typing import Any
 
 import casadi as ca
@@ -228,6 +228,9 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
     low, high = span if span is not None else (None, None)
     if low is not None and high is not None and not low < high:
         raise SceneError(f"found {low:g} to {high:g}, accepted: a range from low to high", ("arguments", name))
+    if re.fullmatch(r"histories\.[^.]+\.t(\.\d+)?", name):
+        message = "found a time or factor at which a history has a knot, accepted: its values or coefficients"
+        raise SceneError(message, ("arguments", name))
     found = _argument(scene, name, low, high)
     if MOVING.fullmatch(name):
         found = _within(scene, found)
@@ -424,6 +427,8 @@ class Arguments:
         self._undeformed, self._given = (
             _Part(part, self._symbols, name) for part, name in ((undeformed, "rest"), (data, "data"))
         )
+        used = {name: symbolic.scene.histories[name] for name in self._groups if name is not None}
+        self._courses = {name: _Part(_course(one), self._symbols, "course") for name, one in used.items()}
         self._check(symbolic)
         self.program = Program(self.expressions, self._varying(), prefix=prefix)
 
@@ -479,7 +484,11 @@ class Arguments:
             if turns:
                 message = "found a number that turns an axis about which angles are unknowns or counted"
                 raise SceneError(f"{message}, accepted: one that leaves it as it is", ("arguments", self._names[i]))
-        for i, used in zip(self._own, self._undeformed.numbers | self._given.numbers, strict=True):
+        known = self._undeformed.numbers | self._given.numbers
+        for name, course in self._courses.items():
+            if f"histories.{name}" not in self._names:
+                known = known | course.numbers
+        for i, used in zip(self._own, known, strict=True):
             if not used:
                 message = "found a number on which nothing depends, accepted: one that the equilibrium depends on"
                 raise SceneError(message, ("arguments", self._names[i]))
@@ -554,10 +563,15 @@ class Arguments:
         name = FACTOR if group is None else f"histories.{group}"
         if name in self._names:
             return p[self._names.index(name)]
-        if group is not None and FACTOR in self._names and self._scene.analysis.type != "dynamic":
-            history = self._scene.histories[group]
-            ends = history.factor(history.t[0]), history.factor(history.t[-1])
-            return piecewise(p[self._names.index(FACTOR)], history.t, history.pieces, ends)
+        course, moving = self._courses.get(group), self._scene.analysis.type == "dynamic"
+        follows = FACTOR in self._names and not moving
+        if course is not None and (follows or course.changing.any()):
+            at = ca.MX(0.0 if moving else argument(self._scene, FACTOR).default[0])
+            at = p[self._names.index(FACTOR)] if follows else at
+            knots = self._scene.histories[str(group)].t
+            flat = course.at(picked(p, np.array(self._own, dtype=np.intp)))
+            terms, ends = ca.vertsplit(flat, [0, flat.numel() - 2, flat.numel()])
+            return piecewise(at, knots, ca.reshape(terms, max(len(knots) - 1, 1), -1), ends)
         # What is no argument stands as it would by default.
         return argument(self._scene, name).default[0]
 
@@ -565,6 +579,14 @@ class Arguments:
         """A function (arguments) -> given, with a name."""
         p = ca.MX.sym("arguments", len(self.defaults))
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
+
+
+def _course(history: History) -> Active:
+    """Coefficients of a history, those of the same power together, then its values at both ends; flat."""
+    pieces = history.pieces or ((0.0,),)
+    columns = zip_longest(*pieces, fillvalue=0.0)
+    ends = [history.factor(history.t[0]), history.factor(history.t[-1])]
+    return Active.of(numbers([*(term for column in columns for term in column), *ends]))
 
 
 def in_words(arguments: Arguments, results: Results) -> list[str]:
