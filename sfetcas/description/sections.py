@@ -17,7 +17,18 @@ from ..mathematics.interpolation import power_series
 from .formulas import SAMPLES, Formula
 from .records import NotNegative, Number, Numbers, Record, number, say
 
-__all__ = ["HEAVY", "CrossSection", "Polynomial", "Quantity", "Table", "Varying", "breaks", "evaluate", "quantity"]
+__all__ = [
+    "FINE",
+    "HEAVY",
+    "CrossSection",
+    "Polynomial",
+    "Quantity",
+    "Table",
+    "Varying",
+    "breaks",
+    "evaluate",
+    "quantity",
+]
 
 Floats = NDArray[np.float64]
 
@@ -206,6 +217,9 @@ Inertia = Annotated[Varying, AfterValidator(_not_negative)]
 HEAVY = np.linspace(0.0, 1.0, SAMPLES)
 """Fractions of the length at which a mass is looked for."""
 
+FINE = tuple((np.arange(1, 64) / 64).tolist())
+"""Ends of the panels on which a formula is integrated where no error estimate asks for finer ones."""
+
 Outline = Callable[..., tuple[Floats, Floats, Floats, Floats]]
 
 
@@ -370,15 +384,22 @@ class CrossSection(Record):
     @property
     def breaks(self) -> tuple[float, ...]:
         """Fractions strictly between 0 and 1 where the slope of some quantity jumps, rising."""
-        return tuple(sorted({kink for item in self._varying() for kink in breaks(item)}))
+        return tuple(sorted({kink for item in self.varying for kink in breaks(item)}))
+
+    @property
+    def panels(self) -> tuple[float, ...]:
+        """Fractions strictly between 0 and 1 between which quadrature of nine points integrates a section."""
+        formulas = any(isinstance(item, Formula) for item in self.varying)
+        return tuple(sorted({*self.breaks, *(FINE if formulas else ())}))
 
     @property
     def even(self) -> bool:
         """Whether it is constant along the member."""
-        return not any(isinstance(item, (Table, Polynomial, Formula)) for item in self._varying())
+        return not any(isinstance(item, (Table, Polynomial, Formula)) for item in self.varying)
 
-    def _varying(self) -> list[Quantity]:
-        """What may vary along the member."""
+    @property
+    def varying(self) -> list[Quantity]:
+        """What may vary along the member, of all that is given."""
         names = ("EI2", "EI3", "GJ", "rhoA", "E", "G", "rho", *_DIMENSIONS)
         return [getattr(self, name) for name in self._given(names)] + list(self.rhoI or ())
 
