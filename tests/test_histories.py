@@ -303,6 +303,38 @@ def test_derivatives_by_the_factor_go_through_histories(course):
             np.testing.assert_allclose(second, (high - low) / (2 * h), atol=1e-5)
 
 
+NUMBERS = {
+    "linear": "histories.on.value.1",
+    "spline": "histories.on.value.2",
+    "polynomial": "histories.on.polynomial.1.0",
+    "one value": "histories.on.value.0",
+}
+
+
+@pytest.mark.parametrize("course", COURSES)
+def test_numbers_of_a_history_are_parameters_with_and_without_the_factor(course):
+    scene, name, h = driven(course).replace({"factor": 0.8}), NUMBERS[course], 1e-4
+    both, alone = (parametric(scene, names, ANSWERS) for names in (["factor", name], [name]))
+    (value,) = alone.solver.arguments.defaults
+    changed = solve_model(assemble(scene.replace({name: value + 0.1}), alone.solver.model.mesh), 0.8)
+    for made in (both, alone):
+        answer = made.solve()
+        ends = [made.solve({name: value + side * h}) for side in (-1, 1)]
+        for key in ANSWERS:
+            # Central differences: h^2 of third derivatives of about 10.
+            slope = (ends[1][key] - ends[0][key]) / (2 * h)
+            np.testing.assert_allclose(answer.jacobian[key][name], slope, atol=1e-6)
+            assert np.abs(slope).max() > 1e-3
+        found = made.solve({name: value + 0.1})["nodes.B.position"]
+        np.testing.assert_allclose(found, changed.position("B"), atol=1e-9)
+
+
+def test_times_of_a_history_are_no_parameters():
+    for name in ("histories.on.t.1", "histories.on.t"):
+        with pytest.raises(SceneError, match=r"found a time or factor at which a history has a knot, accepted: its v"):
+            parametric(driven("linear"), [name], ANSWERS)
+
+
 def test_a_derivative_at_the_end_of_a_history_is_that_within():
     scene = driven("linear")
     within = parametric(scene, ["factor"], ANSWERS).solve({"factor": 1.0 - 1e-9})

@@ -345,7 +345,7 @@ VALUES = [
     ({"loads.tip.valu": 1.0}, "values: found 'loads.tip.valu', accepted: .* did you mean 'loads.tip.value'?"),
     ({"loads.tip.value": 1.0}, "values.loads.tip.value: found 1.0, accepted: 2 finite numbers"),
     ({"sections.s.rhoA": "much"}, "values.sections.s.rhoA: found 'much', accepted: a finite number"),
-    ({"sections.s.rhoA": -1.0}, "values.sections.s.rhoA: found -1, accepted: above zero"),
+    ({"sections.s.rhoA": -1.0}, "values.sections.s.rhoA: found -1, accepted: zero or more"),
 ]
 
 

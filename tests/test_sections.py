@@ -109,7 +109,7 @@ def test_breaks_are_those_of_all_quantities():
     assert CrossSection(EI2=1).breaks == ()
 
 
-@pytest.mark.parametrize("name", ["EI2", "EI3", "GJ", "rhoA"])
+@pytest.mark.parametrize("name", ["EI2", "EI3", "GJ"])
 @pytest.mark.parametrize(
     ("value", "message"),
     [
@@ -127,9 +127,16 @@ def test_breaks_are_those_of_all_quantities():
         ({"polynomial": [1, -6, 9]}, r"found 0 at 0\.333"),
     ],
 )
-def test_stiffness_and_mass_are_above_zero_everywhere(name, value, message):
+def test_stiffness_is_above_zero_everywhere(name, value, message):
     with pytest.raises(SceneError, match=f"^{name}: {message}"):
         CrossSection(**{name: value})
+
+
+def test_a_mass_may_be_zero_but_not_below():
+    assert not CrossSection(EI3=1, rhoA=0).heavy
+    assert CrossSection(EI3=1, rhoA={"polynomial": [1, -1]}).heavy
+    with pytest.raises(SceneError, match=r"^rhoA: found -2 at 0\.5 of the length, .* zero or a number above zero"):
+        CrossSection(rhoA={"at": [0, 0.5, 1], "value": [1, -2, 1]})
 
 
 @pytest.mark.parametrize("value", [[1, -5, 6.26], [1e-9], [0.1, 0, 0, 5], [1, -2, 1.0001]])

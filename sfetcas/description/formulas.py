@@ -17,6 +17,7 @@ from pydantic import model_validator
 
 from ..errors import SceneError
 from ..mathematics.arrays import Array, numbers, values_of
+from ..mathematics.interpolation import evaluation, lobatto
 from .records import Record, say
 
 __all__ = ["SAMPLES", "Formula"]
@@ -46,6 +47,12 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "log": np.log,
     "abs": np.abs,
 }
+ROUGH = 0.01
+"""Share of the largest value by which polynomials between the edges of a formula may miss it."""
+
+NARROWEST = 1e-4
+"""Width of the narrowest parts that a formula is divided into."""
+
 PLACES = ("x", "s")
 ACCEPTED = f"numbers, {', '.join(PLACES)}, pi, + - * / ** ( ) and {', '.join(FUNCTIONS)}"
 
@@ -154,6 +161,29 @@ class Formula(Record):
         if wrong.any():
             found = f"found {say(self.formula)}, which is no finite number at {x[wrong][0]:g} of the length"
             raise SceneError(f"{found}, accepted: a finite number everywhere", where)
+
+    def edges(self, length: float = np.nan) -> tuple[float, ...]:
+        """Fractions strictly between 0 and 1 between which polynomials of degree 4 come near to it: halves of halves.
+
+        None where one polynomial does.
+        """
+        nodes, length = lobatto(5)[0], float(values_of(length))
+        places = np.linspace(0.0, 1.0, 13)
+        between = evaluation(nodes, places)
+        size = float(np.abs(self.at(np.linspace(0.0, 1.0, SAMPLES), length)).max())
+        # As narrow as a sixteenth a feature is looked for; what is found is divided further.
+        left, width, found = np.arange(16) / 16, 1.0 / 16, set[float]()
+        while len(left) and width > NARROWEST:
+            at = left[:, None] + width * places
+            wrong = np.abs(self._grid(left[:, None] + width * nodes, length) @ between.T - self._grid(at, length))
+            left = left[wrong.max(axis=1) > ROUGH * size]
+            width *= 0.5
+            found |= {*left.tolist(), *(left + width).tolist(), *(left + 2.0 * width).tolist()}
+            left = np.sort(np.concatenate([left, left + width]))
+        return tuple(sorted(found - {0.0, 1.0}))
+
+    def _grid(self, x: Array, length: float) -> Array:
+        return self.at(x.ravel(), length).reshape(x.shape)
 
     def breaks(self, length: float = np.nan) -> tuple[float, ...]:
         """Fractions strictly between 0 and 1 where an argument of ``abs`` turns its sign."""

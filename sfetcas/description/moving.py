@@ -28,7 +28,7 @@ def check_masses(
     SceneError
         No member and no node has any.
     """
-    heavy = any(m.section is not None and not sections[m.section].missing(["rhoA"]) for m in members.values())
+    heavy = any(m.section is not None and sections[m.section].heavy for m in members.values())
     heavy = heavy or any(any(map(any, member.mass or ())) for member in members.values())
     if not heavy and not any(node.mass or any(node.inertia or ()) for node in nodes.values()):
         accepted = "a section with 'rhoA', a node with 'mass' or 'inertia', or a small member with 'mass'"

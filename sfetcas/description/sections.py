@@ -19,7 +19,18 @@ from .formulas import SAMPLES, Formula
 from .laws import Law
 from .records import NotNegative, Number, Numbers, Record, number, say
 
-__all__ = ["CrossSection", "Polynomial", "Quantity", "Table", "Varying", "breaks", "evaluate", "quantity"]
+__all__ = [
+    "FINE",
+    "HEAVY",
+    "CrossSection",
+    "Polynomial",
+    "Quantity",
+    "Table",
+    "Varying",
+    "breaks",
+    "evaluate",
+    "quantity",
+]
 
 Floats = NDArray[np.float64]
 
@@ -211,6 +222,12 @@ def _share(value: float) -> float:
 Above = Annotated[Varying, AfterValidator(_above_zero)]
 Inertia = Annotated[Varying, AfterValidator(_not_negative)]
 
+HEAVY = np.linspace(0.0, 1.0, SAMPLES)
+"""Fractions of the length at which a mass is looked for."""
+
+FINE = tuple((np.arange(1, 64) / 64).tolist())
+"""Ends of the panels on which a formula is integrated where no error estimate asks for finer ones."""
+
 Outline = Callable[..., tuple[Floats, Floats, Floats, Floats]]
 
 
@@ -289,7 +306,8 @@ class CrossSection(Record):
         ``GJ`` times the change of the twist plus the first entry times that of the curvature about b2 plus the
         second times that about b3, and so on.  Needs all three stiffnesses.  Default: zero.
     rhoA : kg/m
-        Mass per length.  Needed with gravity, rotating axes, modes and motions.
+        Mass per length.  Needed with gravity, rotating axes, modes and motions; zero for a member without mass, as
+        of a light spring between heavy bodies.
     rhoI : (3,), kg m
         Rotary inertia per length about b1, b2, b3, for modes and motions.  Default: zero.
     law : table
@@ -317,7 +335,7 @@ class CrossSection(Record):
     G : N/m²
         Shear modulus of a shape.
     rho : kg/m³
-        Density of a shape.
+        Density of a shape, or zero.
     width : m
         Of a rectangle, along b3.
     height : m
@@ -344,7 +362,7 @@ class CrossSection(Record):
     GA2: Above | None = None
     GA3: Above | None = None
     coupling: Annotated[tuple[Varying, Varying, Varying], BeforeValidator(_three)] | None = None
-    rhoA: Above | None = None
+    rhoA: Inertia | None = None
     rhoI: Annotated[tuple[Inertia, Inertia, Inertia], BeforeValidator(_three)] | None = None
     law: Law | None = None
     damping: NotNegative = 0.0
@@ -356,7 +374,7 @@ class CrossSection(Record):
     E: Above | None = None
     nu: Annotated[Number, AfterValidator(_poisson)] | None = None
     G: Above | None = None
-    rho: Above | None = None
+    rho: Inertia | None = None
     width: Above | None = None
     height: Above | None = None
     radius: Above | None = None
@@ -454,15 +472,22 @@ class CrossSection(Record):
     @property
     def breaks(self) -> tuple[float, ...]:
         """Fractions strictly between 0 and 1 where the slope of some quantity jumps, rising."""
-        return tuple(sorted({kink for item in self._varying() for kink in breaks(item)}))
+        return tuple(sorted({kink for item in self.varying for kink in breaks(item)}))
+
+    @property
+    def panels(self) -> tuple[float, ...]:
+        """Fractions strictly between 0 and 1 between which quadrature of nine points integrates a section."""
+        formulas = any(isinstance(item, Formula) for item in self.varying)
+        return tuple(sorted({*self.breaks, *(FINE if formulas else ())}))
 
     @property
     def even(self) -> bool:
         """Whether it is constant along the member."""
-        return not any(isinstance(item, (Table, Polynomial, Formula)) for item in self._varying())
+        return not any(isinstance(item, (Table, Polynomial, Formula)) for item in self.varying)
 
-    def _varying(self) -> list[Quantity]:
-        """What may vary along the member."""
+    @property
+    def varying(self) -> list[Quantity]:
+        """What may vary along the member, of all that is given."""
         names = ("EI2", "EI3", "GJ", "EA", "GA2", "GA3", "rhoA", "E", "G", "rho", *_DIMENSIONS)
         return [getattr(self, name) for name in self._given(names)] + [*(self.coupling or ()), *(self.rhoI or ())]
 
@@ -606,6 +631,12 @@ class CrossSection(Record):
     def radii(self, x: ArrayLike) -> tuple[Floats, Floats]:
         """Outer and inner radius (m) of a tube at fractions x (n,), each (n,)."""
         return self._value("outer", x), self._value("inner", x)
+
+    @property
+    def heavy(self) -> bool:
+        """Whether it has a mass above zero somewhere."""
+        density = self.rhoA if self.shape is None else self.rho
+        return density is not None and bool(evaluate(density, HEAVY).any())
 
     def mass(self, x: ArrayLike) -> Floats:
         """Mass per length: x (n,) fractions of the length -> (n,) kg/m, nan where not known."""

@@ -9,7 +9,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
 
-__all__ = ["check_inertia", "check_resisted"]
+__all__ = ["check_balanced", "check_inertia", "check_resisted"]
 
 SHIFT = 1e-13
 """Shift of an equilibrated matrix: what its entries have of rounding, or less."""
@@ -73,6 +73,35 @@ def check_resisted(equations: Equations, matrix: Array) -> None:
         raise SceneError(f"{why}, and no stiffness either, accepted: {accepted}")
 
 
+def check_balanced(equations: Equations, matrix: Array, forces: Array) -> None:
+    """Refuse a motion that begins with forces on what has neither inertia nor damping, which would have to jump.
+
+    Parameters
+    ----------
+    matrix : ndarray (unknowns, any)
+        Mass, damping and transposed constraint matrices side by side, dimensionless.
+    forces : ndarray (unknowns,)
+        Sum of the other forces at the beginning.
+
+    Raises
+    ------
+    SceneError
+        Names members or nodes.
+    """
+    sizes = np.abs(matrix).max(axis=0, initial=0.0)
+    columns = matrix[:, sizes > 0.0] / sizes[sizes > 0.0]
+    left = forces - columns @ np.linalg.lstsq(columns, forces, rcond=None)[0]
+    open_ones = np.flatnonzero(np.abs(left) > UNBALANCED * np.abs(forces).max(initial=0.0))
+    if len(open_ones):
+        names = ", ".join(_where(equations, open_ones))
+        accepted = "accepted: a mass there, initial = 'equilibrium', or loads with a history that begins with zero"
+        raise SceneError(f"forces at t = 0 act on what has no inertia, at {names}, and it would jump, {accepted}")
+
+
+UNBALANCED = 1e-6
+"""Share of the largest force at the beginning above which a force is not in balance: equilibria are to 1e-9."""
+
+
 def _null(matrix: Array) -> Array | None:
     """Absolute components, up to 1, of a vector that the matrix takes to rounding; None where there is none."""
     if not len(matrix):
@@ -102,12 +131,9 @@ EQUILIBRATED = 8
 
 def _without_inertia(equations: Equations, unknowns: Array) -> tuple[str, str]:
     """What has none, sections without rotary inertia or else members and nodes, and what is accepted instead."""
-    model, scene = equations.model, equations.model.scene
-    turning = set(np.flatnonzero(np.isin(equations.number, unknowns).any(axis=1)).tolist())
-    along = {name: model.chain(name).tolist() for name in model.members if name in model.beams.first}
-    ends = model.rotations.ends
-    members = [name for name in scene.members if turning & set(along.get(name, ends[name]))]
-    sections = dict.fromkeys(str(scene.members[name].section) for name in members if scene.members[name].section)
+    scene = equations.model.scene
+    found = [scene.members[name] for name in _where(equations, unknowns) if name in scene.members]
+    sections = dict.fromkeys(str(member.section) for member in found if member.section)
     light = [name for name in sections if not scene.sections[name].inertia(np.linspace(0.0, 1.0, 3)).any()]
     if light:
         sections_of = "section" if len(light) == 1 else "sections"
@@ -115,7 +141,15 @@ def _without_inertia(equations: Equations, unknowns: Array) -> tuple[str, str]:
             f"without 'rhoI' of the {sections_of} {', '.join(light)} some rotations have no inertia",
             f"'rhoI', or {OTHERS}",
         )
+    return f"what turns or moves at {', '.join(_where(equations, unknowns))} has no inertia", OTHERS
+
+
+def _where(equations: Equations, unknowns: Array) -> list[str]:
+    """Members along which unknowns turn, and places that they move."""
+    model, scene = equations.model, equations.model.scene
+    turning = set(np.flatnonzero(np.isin(equations.number, unknowns).any(axis=1)).tolist())
+    along = {name: model.chain(name).tolist() for name in model.members if name in model.beams.first}
+    members = [name for name in scene.members if turning & set(along.get(name, model.rotations.ends[name]))]
     y, axes = model.positions.Y, model.element.axes
     moving = np.unique(y.row[np.isin(equations.rotation_unknowns + y.column, unknowns)] // axes)
-    names = [*members, *(model.segments.places[i] for i in moving)]
-    return f"what turns or moves at {', '.join(names)} has no inertia", OTHERS
+    return [*members, *(model.segments.places[i] for i in moving)]

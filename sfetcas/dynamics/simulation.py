@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,6 +14,7 @@ import numpy as np
 
 from .. import tolerances
 from ..description.scene import Scene
+from ..description.sections import HEAVY
 from ..equilibria.meshing import WHERE, Meshing
 from ..equilibria.quantities import Quantity
 from ..equilibria.settings import Settings
@@ -20,7 +22,7 @@ from ..equilibria.solution import Equilibrium, superelement_notes
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.threads import single_threaded
-from ..mechanics.equations import Equations
+from ..mechanics.equations import Equations, State
 from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
@@ -29,7 +31,7 @@ from .beginning import at_rest, equilibrium_before, moving, posed, velocities
 from .conserving import Conserving
 from .idas import Idas
 from .inertia import Inertia
-from .inertialess import check_resisted
+from .inertialess import check_balanced, check_resisted
 from .integrators import SHORTEST, InitialState, Integrator, Stages, TimeGrid
 from .methods import GeneralisedAlpha, Radau
 from .motion import MotionState, Mover, Trajectory
@@ -194,6 +196,8 @@ class Simulation:
         except SolveError as error:
             if not run.instants:
                 check_resisted(equations, _resistance(system, begun))
+            elif self.weightless and error.status is Status.STOPPED:
+                error = SolveError(error.status, f"{error.detail}; {SNAPS}", error.last)
             run.failure = error
         if watch is None or not watch.ended:
             run.instants += [mover.instant(sample) for sample in integrator.rest()]
@@ -203,6 +207,12 @@ class Simulation:
         run.count, run.gap, run.norm, run.record = integrator.count, integrator.gap, integrator.norm, integrator.record
         self.seconds["solve"] += time.perf_counter() - solving
         return run
+
+    @functools.cached_property
+    def weightless(self) -> bool:
+        """Whether a flexible member has no mass somewhere: its shape then follows from the forces at each instant."""
+        members = (one for one in self.scene.members.values() if one.type == "flexible")
+        return any(not self.scene.sections[str(one.section)].mass(HEAVY).all() for one in members)
 
     def _refuse_large(self, instant: MotionState) -> None:
         message = instant.fields.too_large() if self.superelements else ""
@@ -220,6 +230,17 @@ class Simulation:
         equations, factors = system.equations, system.factors(0.0)
         loading = system.loading(factors)
         state = equations.holding(state, loading)
+        if self.weightless:
+            if self.name == "conserving":
+                message = (
+                    "found 'conserving' with a flexible member without mass, whose shape it lets swing without end"
+                )
+                accepted = "accepted: radau-3, radau-2 or generalised-alpha, or a small rhoA"
+                raise SceneError(f"{message}, {accepted}", ("analysis", "integrator"))
+            beginning = _Beginning(system)
+            if self.scene.analysis.initial == "equilibrium":
+                state = beginning.settled(state, factors)
+            beginning.check(state, factors)
         rates, more = velocities(system, equations, state)
         return InitialState(state, rates, *system.rates(state, factors, rates)), (*notes, *more)
 
@@ -425,13 +446,62 @@ LOST = 0.05
 """Share of what moves that a total energy may change by without a note: Radau's methods damp waves by some percent."""
 
 
+class _Beginning:
+    """What acts at the begin, without velocities and accelerations, dimensionless."""
+
+    def __init__(self, system: StageEquations) -> None:
+        n = system.layout
+        q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
+        factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
+        stage = system.stage(q, y, lam, ca.MX.zeros(n.x), factors, unwrapped)
+        parts = [system.static_matrix(stage), system.coupling_matrix(stage, 0.0, 1.0)]
+        parts += [system.coupling_matrix(stage, 1.0, 0.0), stage.residual]
+        self._function = ca.Function("begin", [q, y, lam, factors, unwrapped], parts)
+        self._equations = system.equations
+
+    def __call__(self, state: State, lam: Array, factors: Array) -> tuple[Array, Array, Array, Array]:
+        """Stiffness with closings, masses and dampers, (total, total) each, and the sum of all forces (total,)."""
+        given = (state.q.T, state.y, lam, factors, state.unwrapped)
+        stiffness, mass, damping, forces = (np.array(part) for part in self._function.call([ca.DM(x) for x in given]))
+        return stiffness, mass, damping, forces.ravel()
+
+    def check(self, state: State, factors: Array) -> None:
+        """Refuse what the forces leave open, or would let jump."""
+        n, lam = self._equations.unknowns, np.zeros(self._equations.rows)
+        # Without loads, which are not yet in balance.
+        stiffness, mass, _, _ = self(state, lam, 0.0 * factors)
+        check_resisted(self._equations, stiffness + mass)
+        stiffness, mass, damping, forces = self(state, lam, factors)
+        parts = [mass[:n, :n], damping[:n, :n], stiffness[:n, n:]]
+        check_balanced(self._equations, np.hstack(parts), forces[:n])
+
+    def settled(self, state: State, factors: Array) -> State:
+        """A state near balance with what has no mass in balance, while what has mass stays where it is."""
+        n = self._equations.unknowns
+        lam = np.zeros(self._equations.rows)
+        for _ in range(SETTLING):
+            stiffness, mass, _, forces = self(state, lam, factors)
+            change = np.linalg.lstsq(stiffness + HELD * mass, -forces, rcond=None)[0]
+            state, lam = self._equations.moved(state, np.append(change[:n], np.zeros(len(lam)))), lam + change[n:]
+        return state
+
+
+HELD = 1e8
+"""Times their mass the stiffness by which masses are held, in the units of the model."""
+
+SETTLING = 6
+"""Iterations of Newton's method, from a state that has another mesh only."""
+
+
 def _resistance(system: StageEquations, begun: InitialState) -> Array:
-    """Stiffness, masses and closings at the begin."""
-    n, state = system.layout, begun.state
-    q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
-    factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
-    stage = system.stage(q, y, lam, ca.MX.zeros(n.x), factors, unwrapped)
-    whole = system.static_matrix(stage) + system.coupling_matrix(stage, 0.0, 1.0)
-    matrix = ca.Function("resistance", [q, y, lam, factors, unwrapped], [whole])
-    # Without loads, which are not yet in balance.
-    return np.array(matrix(state.q.T, state.y, np.zeros(n.lam), np.zeros(n.factors), state.unwrapped))
+    """Stiffness, masses and closings at the begin, without loads, which are not yet in balance."""
+    layout = system.layout
+    stiffness, mass, _, _ = _Beginning(system)(begun.state, np.zeros(layout.lam), np.zeros(layout.factors))
+    return np.asarray(stiffness + mass)
+
+
+SNAPS = (
+    "a flexible member without mass has no motion of its own: where it is drawn straight, or snaps, it would have to "
+    "jump, accepted: a small rhoA"
+)
+"""What is said where a motion with such a member ends."""

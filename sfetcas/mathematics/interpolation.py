@@ -138,6 +138,10 @@ def cubic_spline(x: ArrayLike, y: ArrayLike, ends: tuple[str, str] = ("clamped",
     from scipy.interpolate import CubicSpline
 
     x, y = numbers(x), numbers(y)
+    if not isinstance(y, np.ndarray):
+        # Of values that depend on symbols it is linear.
+        by_value = np.array([cubic_spline(x, one, ends) for one in np.eye(len(x))])
+        return numbers(np.einsum("ijk,i->jk", by_value, y))
     # In units of the whole, in which nothing overflows that need not.
     span, size = float(x[-1] - x[0]), float(np.abs(y).max()) or 1.0
     with np.errstate(all="ignore"):

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import zip_longest
-
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 __all__ = ["piecewise"]
 
 
-def piecewise(at: ca.MX, knots: Sequence[float], pieces: Sequence[Sequence[float]], ends: tuple[float, float]) -> ca.MX:
+def piecewise(at: ca.MX, knots: ArrayLike, terms: ca.MX | ca.DM, ends: ca.MX | ca.DM) -> ca.MX:
     """A function that is a polynomial between each two knots, and constant outside of them.
 
     A knot belongs to the piece after it, the last one to the piece before it: the derivatives there are those of this
@@ -23,7 +21,7 @@ def piecewise(at: ca.MX, knots: Sequence[float], pieces: Sequence[Sequence[float
         Where it is evaluated, one number.
     knots : (n,)
         Rising.
-    pieces : (n - 1, any)
+    terms : (n - 1, any)
         Coefficients of each piece in the fraction of its interval.
     ends : (2,)
         Value before the first knot, and from the last on.
@@ -38,9 +36,8 @@ def piecewise(at: ca.MX, knots: Sequence[float], pieces: Sequence[Sequence[float
     begins, spans = ca.DM(t[:-1]), ca.DM(np.diff(t))
     last = ca.DM(np.append(np.zeros(len(t) - 2), 1.0))
     chosen = (here >= begins) * ((here < ca.DM(t[1:])) + last * (here == float(t[-1])))
-    terms = [ca.DM(list(column)) for column in zip_longest(*pieces, fillvalue=0.0)]
-    value = terms[-1]
-    x = (here - begins) / spans
-    for term in reversed(terms[:-1]):
-        value = term + value * x
+    columns = ca.horzsplit(ca.MX(terms))
+    value, x = columns[-1], (here - begins) / spans
+    for column in reversed(columns[:-1]):
+        value = column + value * x
     return inside * ca.dot(chosen, value) + before * ends[0] + after * ends[1]

@@ -301,7 +301,7 @@ class _Writer:
     def _add_weight_of_chord(self, group: _Sums, member: str) -> None:
         """The mass of a rigid member is spread over the straight line between its nodes, whatever its shape."""
         section = self.scene.sections[str(self.scene.members[member].section)]
-        x, w = pieces(section.breaks, 9)
+        x, w = pieces(section.panels, 9)
         start, end = (numbers(self.scene.nodes[n].position) for n in self.scene.members[member].nodes)
         share = section.mass(x) * w * np.linalg.norm(end - start)
         weight = self.vector(self.scene.gravity)

@@ -212,7 +212,7 @@ class _Weigher:
         section = scene.sections[str(member.section)]
         if section.missing(["rhoA"]):
             return
-        x, w = pieces(section.breaks, 9)
+        x, w = pieces(section.panels, 9)
         start, end = (scene.nodes[n].position for n in member.nodes)
         chord = place(Straight(), start, end, member.b2, ("members", name))
         share = section.mass(x) * w * chord.length

@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import tolerances
+from ..description.formulas import Formula
 from ..description.records import brief, counted
 from ..description.scene import Scene, check_scene
+from ..description.sections import FINE
 from ..description.sections import breaks as kinks
 from ..description.showing import first_lines, shown
 from ..description.tendons import kinks_along
@@ -213,7 +215,9 @@ def rigid(scene: Scene) -> frozenset[str]:
 def rigid_cuts(scene: Scene, member: str) -> Array:
     """Ends (n + 1,) of the elements of a rigid member, which share one rotation and integrate loads along its shape."""
     turning = scene.center_lines[member].turning
-    return _divided(breaks_of(scene, member), max(1, int(np.ceil(4.0 * turning))))
+    # These elements are never halved: what they integrate they integrate at once.
+    fine = len(FINE) + 1 if _formulas(scene, member) else 1
+    return _divided(breaks_of(scene, member), max(fine, int(np.ceil(4.0 * turning))))
 
 
 def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
@@ -241,7 +245,22 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
         count = int(min(max(2.0, np.ceil((expected + waves) / turning)), 2000.0))
         layer = np.sqrt(softest / most) / line.length if most > 0.0 else np.inf
         cuts[name] = _graded(_divided(breaks_of(scene, name), count), breaks_of(scene, name), layer)
+        edges = [x for formula in _formulas(scene, name) for x in formula.edges(line.length)]
+        beside = np.array([np.abs(cuts[name] - x).min() for x in edges])
+        cuts[name] = np.unique([*cuts[name], *np.array(edges)[beside > NEXT]])
     return Mesh(order, cuts, rigid=rigid(scene))
+
+
+NEXT = 1e-3
+"""Fraction of the length by which an edge of a formula is apart from an end of an element, or there is no further end:
+elements that are much shorter than those beside them are slivers."""
+
+
+def _formulas(scene: Scene, member: str) -> list[Formula]:
+    """Formulas of the section of a member and of the loads along it."""
+    loads = [load.profile for load in scene.loads.values() if load.member == member]
+    section = scene.sections.get(str(scene.members[member].section))
+    return [one for one in (*loads, *(section.varying if section else ())) if isinstance(one, Formula)]
 
 
 def _graded(cuts: Array, breaks: Array, layer: float) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from typing import Any
 
 import casadi as ca
@@ -107,14 +107,16 @@ class Argument:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Least and largest accepted value: the range; else above zero for sections, from zero for a tension."""
+        """Least and largest accepted value: the range; else above zero for stiffness, from zero for masses, tension."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
         entry = ".law." in self.name and (self.components is not None or self.name[-1].isdigit())
         signed = entry or ".polynomial" in self.name or ".coupling" in self.name
-        if self.name.startswith("sections.") and not signed:
+        of_section = self.name.startswith("sections.") and not signed
+        light = of_section and self.name.split(".")[2] in MAY_BE_ZERO
+        if of_section and not light:
             return float(np.nextafter(0.0, 1.0)), np.inf
-        return (0.0 if self.name.endswith(NOT_NEGATIVE) else -np.inf), np.inf
+        return (0.0 if light or self.name.endswith(NOT_NEGATIVE) else -np.inf), np.inf
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -126,6 +128,9 @@ class Argument:
 
 NOT_NEGATIVE = (".stiffness", ".tension", ".pressure", ".area")
 """Ends of the names of numbers that are zero or above."""
+
+MAY_BE_ZERO = ("rhoA", "rhoI", "rho", "damping", "drag")
+"""Keys of sections whose numbers may be zero."""
 
 Asked = Sequence[str] | Mapping[str, tuple[float, float] | Parameter | None] | None
 """Names of numbers, or a mapping of them to ranges (None: no range) or :class:`Parameter`; None: defaults."""
@@ -234,6 +239,9 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
     low, high = span if span is not None else (None, None)
     if low is not None and high is not None and not low < high:
         raise SceneError(f"found {low:g} to {high:g}, accepted: a range from low to high", ("arguments", name))
+    if re.fullmatch(r"histories\.[^.]+\.t(\.\d+)?", name):
+        message = "found a time or factor at which a history has a knot, accepted: its values or coefficients"
+        raise SceneError(message, ("arguments", name))
     found = _argument(scene, name, low, high)
     if MOVING.fullmatch(name):
         found = _within(scene, found)
@@ -477,6 +485,8 @@ class Arguments:
         self._undeformed, self._given = (
             _Part(part, self._symbols, name) for part, name in ((undeformed, "rest"), (data, "data"))
         )
+        used = {name: symbolic.scene.histories[name] for name in self._groups if name is not None}
+        self._courses = {name: _Part(_course(one), self._symbols, "course") for name, one in used.items()}
         self._check(symbolic)
         self.program = Program(self.expressions, self._varying(), prefix=prefix)
 
@@ -532,7 +542,11 @@ class Arguments:
             if turns:
                 message = "found a number that turns an axis about which angles are unknowns or counted"
                 raise SceneError(f"{message}, accepted: one that leaves it as it is", ("arguments", self._names[i]))
-        for i, used in zip(self._own, self._undeformed.numbers | self._given.numbers, strict=True):
+        known = self._undeformed.numbers | self._given.numbers
+        for name, course in self._courses.items():
+            if f"histories.{name}" not in self._names:
+                known = known | course.numbers
+        for i, used in zip(self._own, known, strict=True):
             if not used:
                 message = "found a number on which nothing depends, accepted: one that the equilibrium depends on"
                 raise SceneError(message, ("arguments", self._names[i]))
@@ -607,10 +621,15 @@ class Arguments:
         name = FACTOR if group is None else f"histories.{group}"
         if name in self._names:
             return p[self._names.index(name)]
-        if group is not None and FACTOR in self._names and self._scene.analysis.type != "dynamic":
-            history = self._scene.histories[group]
-            ends = history.factor(history.t[0]), history.factor(history.t[-1])
-            return piecewise(p[self._names.index(FACTOR)], history.t, history.pieces, ends)
+        course, moving = self._courses.get(group), self._scene.analysis.type == "dynamic"
+        follows = FACTOR in self._names and not moving
+        if course is not None and (follows or course.changing.any()):
+            at = ca.MX(0.0 if moving else argument(self._scene, FACTOR).default[0])
+            at = p[self._names.index(FACTOR)] if follows else at
+            knots = self._scene.histories[str(group)].t
+            flat = course.at(picked(p, np.array(self._own, dtype=np.intp)))
+            terms, ends = ca.vertsplit(flat, [0, flat.numel() - 2, flat.numel()])
+            return piecewise(at, knots, ca.reshape(terms, max(len(knots) - 1, 1), -1), ends)
         # What is no argument stands as it would by default.
         return argument(self._scene, name).default[0]
 
@@ -618,6 +637,14 @@ class Arguments:
         """A function (arguments) -> given, with a name."""
         p = ca.MX.sym("arguments", len(self.defaults))
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
+
+
+def _course(history: History) -> Active:
+    """Coefficients of a history, those of the same power together, then its values at both ends; flat."""
+    pieces = history.pieces or ((0.0,),)
+    columns = zip_longest(*pieces, fillvalue=0.0)
+    ends = [history.factor(history.t[0]), history.factor(history.t[-1])]
+    return Active.of(numbers([*(term for column in columns for term in column), *ends]))
 
 
 def in_words(arguments: Arguments, results: Results) -> list[str]:
