@@ -112,7 +112,7 @@ def load_size(scene: Scene, length: float) -> float:
 def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beams:
     """Data of the elements of all members; small members have no elements."""
     stiffness, tangent, weight, compliance = [], [], [], []
-    size = element.axes**2 if element.strains else 0
+    size = element.compliances
     first: dict[str, int] = {}
     count = 0
     for name, member in scene.members.items():

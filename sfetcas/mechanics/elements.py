@@ -77,7 +77,12 @@ class Element(Term):
     @property
     def _widths(self) -> tuple[int, int, int]:
         """Numbers of stiffness, tangent and compliance at a point."""
-        return self.stiffnesses, self.axes, self.axes**2 if self.strains else 0
+        return self.stiffnesses, self.axes, self.compliances
+
+    @property
+    def compliances(self) -> int:
+        """Numbers of compliance at a point: a matrix, column by column, or none."""
+        return self.axes**2 if self.strains else 0
 
     @property
     def stiffnesses(self) -> int:

@@ -29,7 +29,16 @@ from .rotations import RotationFreedom
 from .tables import Tables
 from .terms import Group, rotation_gradient
 
-__all__ = ["UNLOADED", "Equations", "Point", "State", "scaled_strains", "turned_points", "turned_tangents"]
+__all__ = [
+    "UNLOADED",
+    "Equations",
+    "Point",
+    "State",
+    "gained_tangents",
+    "scaled_strains",
+    "turned_points",
+    "turned_tangents",
+]
 
 UNLOADED = 1e-6
 """Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
@@ -518,7 +527,7 @@ def turned_tangents(model: Model, state: State) -> Array:
     dimensionless.
     """
     q = turned_points(model, state.q)
-    return quaternion.turned_by(q, model.beams.tangent + _gained_tangents(model, state.y))
+    return quaternion.turned_by(q, model.beams.tangent + gained_tangents(model, state.y))
 
 
 def turned_points(model: Model, q: Array) -> Array:
@@ -529,11 +538,13 @@ def turned_points(model: Model, q: Array) -> Array:
     return np.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True) if model.space else q)
 
 
-def _gained_tangents(model: Model, y: Array) -> Array | float:
-    """What strains add to the tangents before they are turned, (elements, points, axes), dimensionless."""
+def gained_tangents(model: Model, y: Array) -> Array:
+    """What strains add to the tangents before they are turned, times weight and length, (elements, points, axes),
+    dimensionless.
+    """
     element, strains = model.element, model.segments.strains
     if not element.strains:
-        return 0.0
+        return np.zeros((1, 1, element.axes))
     matrices = model.beams.compliance.reshape(*strains.shape, element.axes, element.axes)
     return np.asarray(np.einsum("ekca,ekc->eka", matrices, scaled_strains(model, y)))
 

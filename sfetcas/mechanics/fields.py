@@ -20,7 +20,7 @@ from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
 from .balance import three as _three
 from .batches import GroupBatch
-from .equations import Equations, State, scaled_strains, turned_points, turned_tangents
+from .equations import Equations, State, gained_tangents, scaled_strains, turned_points, turned_tangents
 from .laws import curvature_by_moment, law_of, least_stiffness
 from .loading import Loading
 from .magnetism import magnet_terms
@@ -281,8 +281,14 @@ class Fields:
         # What is rigid is not bent.
         steps = NEWTON_STEPS if model.scene.members[member].type == "flexible" else 0
         function = share_of(model.space, len(names), steps).map(len(x))
-        data = section_data(model, member, x, model.scales)
-        found = function(body[:, -turns:].T, guess.T, data.T, np.tile(tensions, (len(x), 1)).T)
+        data, frames = section_data(model, member, x, model.scales), model.scene.center_lines[member].quaternions(x)
+        natural = quaternion.rotate(frames, self.natural(member, x))[:, -turns:] * model.scales.length
+        strain = np.zeros((len(x), model.element.axes))
+        if model.element.strains:
+            gained = gained_tangents(model, self.state.y)[part] / model.beams.weight[part][..., None]
+            strain = np.einsum("np,npa->na", at.at_points, gained[at.elements])
+        given = (body[:, -turns:], guess, natural, strain, data, np.tile(tensions, (len(x), 1)))
+        found = function(*(part.T for part in given))
         about, along = (part.full().T for part in found)
         if model.space:
             return quaternion.rotate(rotation, about), quaternion.rotate(rotation, along)

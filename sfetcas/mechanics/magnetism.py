@@ -17,9 +17,10 @@ import numpy as np
 
 from ..description.actuation import PERMEABILITY, Magnet, MagneticField
 from ..errors import SceneError
-from ..mathematics import interpolation, quaternion
+from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers
 from .actuation import inside, points_of
+from .elements import Element
 from .parts import Parts
 from .terms import Discrete, Group, One, Side, Term
 
@@ -114,39 +115,42 @@ class _InField(Term):
 class Magnetised(_InField):
     """Magnetised material along an element.
 
-    Data: moments at the nodes, weights included; where places matter also turned tangents of the undeformed scene,
-    weights included, and places of the nodes there relative to that of the field.
+    Data: moments at the nodes, weights included; where places matter also places of the nodes in the undeformed scene
+    relative to that of the field, and the tangents and compliances of the element.
 
     Attributes
     ----------
-    nodes : int
-        Nodes of the element, which integrates at them.
+    element : Element
+        The element, which integrates at its nodes.
     """
 
     along_element: ClassVar[bool] = True
 
-    nodes: int
+    element: Element
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """The rotations of the element, and where places matter the place at its start."""
-        moves = self.law != "uniform"
-        return self.nodes, int(moves), 0, self.axes * self.nodes * (3 if moves else 1), self.strengths
+        """The rotations of the element, and where places matter the place at its start and its strains."""
+        nodes, strains, *_ = self.element.sizes
+        own = self.axes * nodes
+        if self.law == "uniform":
+            return nodes, 0, 0, own, self.strengths
+        return nodes, 1 + strains, 0, 2 * own + self.element.line_data, self.strengths
 
     def magnets(self, q: list[Side], u: list[Side], data: ca.SX) -> list[tuple[ca.SX, ca.SX, ca.SX, ca.SX]]:
         """Of each node: moment, place, and the same in the undeformed scene."""
-        parts = [ca.reshape(part, self.axes, self.nodes) for part in ca.vertsplit(data, self.axes * self.nodes)]
-        moments = [ca.vertcat(*self.forth(side, ca.vertsplit(parts[0][:, k]))) for k, side in enumerate(q)]
+        nodes = len(q)
+        own = self.axes * nodes
+        rest = ca.reshape(data[:own], self.axes, nodes)
+        moments = [ca.vertcat(*self.forth(side, ca.vertsplit(rest[:, k]))) for k, side in enumerate(q)]
         if self.law == "uniform":
             nowhere = ca.SX.zeros(self.axes)
-            return [(moment, nowhere, parts[0][:, k], nowhere) for k, moment in enumerate(moments)]
-        nodes, weights = interpolation.lobatto(self.nodes)
-        onto = interpolation.integration(nodes, nodes) / weights
-        turned = [ca.vertcat(*self.forth(side, ca.vertsplit(parts[1][:, k]))) for k, side in enumerate(q)]
-        gained = ca.horzcat(*turned) - parts[1]
-        moved = ca.repmat(ca.vertcat(*u[0]), 1, self.nodes) + ca.mtimes(gained, ca.DM(onto.T))
-        start = parts[2]
-        return [(moment, (start + moved)[:, k], parts[0][:, k], start[:, k]) for k, moment in enumerate(moments)]
+            return [(moment, nowhere, rest[:, k], nowhere) for k, moment in enumerate(moments)]
+        start, line = ca.reshape(data[own : 2 * own], self.axes, nodes), data[2 * own :]
+        gained = ca.horzcat(*self.element.tangents(q, u[1:], line)) - self.element.line(line)[0]
+        onto = ca.DM(self.element.to_points / self.element.weights)
+        moved = ca.repmat(ca.vertcat(*u[0]), 1, nodes) + ca.mtimes(gained, onto.T)
+        return [(moment, (start + moved)[:, k], rest[:, k], start[:, k]) for k, moment in enumerate(moments)]
 
     def densities(
         self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX
@@ -246,14 +250,15 @@ def _along_member(
     frames, axes = line.quaternions(x.ravel()), element.axes
     density = quaternion.rotate(frames, magnet.along(x.ravel()))[:, :axes].reshape(*x.shape, axes)
     places = (line.positions(x.ravel())[:, :axes] - position).reshape(*x.shape, axes) / parts.scales.length
-    kind = Magnetised(element.space, law, element.order + 1)
+    kind, lines = Magnetised(element.space, law, element), parts.beams.flat("tangent", "compliance")
     for e in np.flatnonzero(inside(parts, member, magnet.span)).tolist():
         number = first + e
         weight = parts.beams.weight[number][:, None] * (parts.scales.length / parts.scales.moment)
         data, starts = [(density[e] * weight).ravel()], tuple[int, ...]()
         if law != "uniform":
-            data += [parts.beams.tangent[number].ravel(), places[e].ravel()]
-            starts = (parts.segments.place(parts.segments.parts[parts.segments.owner[number]].start),)
+            data += [places[e].ravel(), lines[number]]
+            start = parts.segments.place(parts.segments.parts[parts.segments.owner[number]].start)
+            starts = (start, *parts.segments.strains[number].tolist())
         sides = tuple(parts.rotations.turns[number].tolist())
         data_of = np.concatenate(data)
         yield One(kind, f"magnets.{name}", "", data_of, sides, starts, loads=loads, element=number)

@@ -8,7 +8,8 @@ solves
     C (k - k_0) + sum d x T tau(k) = moment through the cut,
 
 the condition of a minimum of a convex function, from the derivative of the interpolated rotations in a few steps of
-Newton's method, so that the answer is as accurate as the moment.  All vectors are in the axes of the undeformed scene
+Newton's method, so that the answer is as accurate as the moment.  Where the member stretches, ``tau`` depends on its
+strain, too, which is interpolated from the points.  All vectors are in the axes of the undeformed scene
 that turn with the sections.
 """
 
@@ -56,7 +57,9 @@ def section_data(model: Any, member: str, x: Array, scales: Any) -> Array:
     middle = 0.5 * (cuts[at.elements] + cuts[at.elements + 1])
     values = np.zeros((len(x), 3))
     if scene.members[member].type == "flexible":
-        values = scene.sections[str(scene.members[member].section)].stiffness(x) / (scales.moment * scales.length)
+        section = scene.sections[str(scene.members[member].section)]
+        values = section.stiffness_matrix(x) if section.coupled and model.space else section.stiffness(x)
+        values = values / (scales.moment * scales.length)
     frames = quaternion.matrix(line.quaternions(x))
     parts = [in_fixed_axes(values, frames, model.element, line.bending_axis)]
     for _, piece in stretches_of(scene, member):
@@ -68,13 +71,16 @@ def section_data(model: Any, member: str, x: Array, scales: Any) -> Array:
 
 @functools.cache
 def share_of(space: bool, count: int, steps: int) -> ca.Function:
-    """``(moment, guess, data, tensions) ->`` moment and force of the tendons at a section, dimensionless.
+    """``(moment, guess, natural, strain, data, tensions) ->`` moment and force of the tendons at a section,
+    dimensionless.
 
     ``moment`` is that through the cut and ``guess`` the change of the curvature, from which so many steps begin;
-    without steps it is the change of the curvature itself.
+    without steps it is the change of the curvature itself.  ``natural`` is what actuations add to the natural curvature
+    and ``strain`` what stretch and shear add to the tangent, in the axes before the rotation.
     """
     turns, axes, stiff = (3, 3, 6) if space else (1, 2, 1)
     moment, guess = ca.SX.sym("moment", turns), ca.SX.sym("guess", turns)
+    natural, strain = ca.SX.sym("natural", turns), ca.SX.sym("strain", axes)
     data, tensions = ca.SX.sym("data", stiff + count * (2 * axes + 1)), ca.SX.sym("tensions", count)
     c = ca.vertsplit(data[:stiff])
     section = data[0]
@@ -87,19 +93,20 @@ def share_of(space: bool, count: int, steps: int) -> ca.Function:
         for i in range(count):
             own = data[stiff + i * (2 * axes + 1) : stiff + (i + 1) * (2 * axes + 1)]
             forward, arm, there = own[:axes], own[axes : 2 * axes], own[2 * axes]
-            way = forward + (ca.cross(bent, arm) if space else bent * ca.vertcat(-arm[1], arm[0]))
+            way = forward + strain + (ca.cross(bent, arm) if space else bent * ca.vertcat(-arm[1], arm[0]))
             force = tensions[i] * there * way / ca.norm_2(way)
             about += ca.cross(arm, force) if space else arm[0] * force[1] - arm[1] * force[0]
             along += force
         return about, along
 
     bent = ca.SX.sym("bent", turns)
-    missing = ca.mtimes(section, bent) + carried(bent)[0] - moment
+    missing = ca.mtimes(section, bent - natural) + carried(bent)[0] - moment
     slope = ca.jacobian(missing, bent)
-    step = ca.Function("step", [bent, moment, data, tensions], [bent - ca.solve(slope, missing)])
+    given = [moment, natural, strain, data, tensions]
+    step = ca.Function("step", [bent, *given], [bent - ca.solve(slope, missing)])
     here = guess
     for _ in range(steps):
-        here = step(here, moment, data, tensions)
+        here = step(here, *given)
     results = [ca.densify(part) for part in carried(here)]
     name = f"share_{'space' if space else 'plane'}_{count}_{steps}"
-    return ca.Function(name, [moment, guess, data, tensions], results, {"cse": True})
+    return ca.Function(name, [moment, guess, natural, strain, data, tensions], results, {"cse": True})

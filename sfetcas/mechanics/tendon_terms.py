@@ -72,7 +72,8 @@ class _Part(Term):
 class Routed(_Part):
     """A tendon along one element.
 
-    Data: at each point the derivative of its places times weight and length, then its arm times weight.
+    Data: at each point the derivative of its places times weight and length, its arm times weight, and the compliance
+    of the element.
 
     Attributes
     ----------
@@ -85,14 +86,15 @@ class Routed(_Part):
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """The rotations of the element."""
-        n = self.element.order + 1
-        return n, 0, int(self.given), 2 * n * self.axes + 2, 1
+        """The rotations of the element, and its strains."""
+        n, strains, *_ = self.element.sizes
+        return n, strains, int(self.given), n * (2 * self.axes + self.element.compliances) + 2, 1
 
     def length(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
         """Sum over the points."""
         n, axes = self.element.order + 1, self.axes
         forward, arm = (ca.reshape(data[i * n * axes : (i + 1) * n * axes], axes, n) for i in range(2))
+        compliance = ca.reshape(data[2 * n * axes : data.shape[0] - 2], self.element.compliances, n)
         here, slope = self.element.at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
         total = ca.SX(0)
         for k in range(n):
@@ -100,7 +102,8 @@ class Routed(_Part):
                 turned = ca.cross(self.element.curvature(here[:, k], slope[:, k]), arm[:, k])
             else:
                 turned = slope[0, k] * ca.vertcat(-arm[1, k], arm[0, k])
-            total += ca.norm_2(forward[:, k] + turned)
+            way = self.element.strained(forward[:, k], compliance[:, k], ca.vertcat(*u[k])) if u else forward[:, k]
+            total += ca.norm_2(way + turned)
         return total
 
 
@@ -277,9 +280,11 @@ class _Maker:
         rest = np.linalg.norm(forward, axis=2).sum(axis=1)
         kind = Routed(element.space, self.given, element)
         for i in range(b - a):
-            data = np.concatenate([forward[i].ravel(), arm[i].ravel(), rest[i : i + 1], np.zeros(1)])
-            turns = tuple(parts.rotations.turns[first + a + i].tolist())
-            yield One(kind, self.name, "", numbers(data), turns, (), self._row, element=first + a + i)
+            number = first + a + i
+            yielding = parts.beams.compliance[number].ravel()
+            data = np.concatenate([forward[i].ravel(), arm[i].ravel(), yielding, rest[i : i + 1], np.zeros(1)])
+            turns, places = (tuple(part[number].tolist()) for part in (parts.rotations.turns, parts.segments.strains))
+            yield One(kind, self.name, "", numbers(data), turns, places, self._row, element=number)
 
 
 def _length(piece: Stretch, line: Any) -> Any:

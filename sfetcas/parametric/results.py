@@ -489,7 +489,13 @@ class _Outputs:
         return (strain * sections[21, :] if key == "bending_stress" else strain).T
 
     def _natural(self, member: str) -> ca.MX:
-        """Natural twist and curvature, (3, places), 1/m, that actuations add."""
+        """Natural twist and curvature, (3, places), 1/m, section axes, that actuations add."""
+        fixed, sections = self._natural_about(member), self._sections[member]
+        rows = [ca.sum1(sections[12 + 3 * k : 15 + 3 * k, :] * fixed) for k in range(3)]
+        return ca.vertcat(*rows) / self._model.scales.length
+
+    def _natural_about(self, member: str) -> ca.MX:
+        """The same about the fixed axes of the undeformed scene, (3, places), dimensionless."""
         model, expressions, at = self._model, self._expressions, self._stations(member)
         part, n = model.elements_of(member), expressions.points
         values = ca.MX(expressions.turns, n * (part.stop - part.start))
@@ -504,10 +510,7 @@ class _Outputs:
                 load = ca.reshape(expressions.load(number, self._program.given), expressions.turns, -1)
                 onto = sparse(np.arange(len(points)), points, np.ones(len(points)), (len(points), values.shape[1]))
                 values += ca.mtimes(load[:, every.tolist()], onto)
-        fixed = self._about(ca.mtimes(values, ca.sparsify(ca.DM(self._within(member, at.at_points))).T))
-        sections = self._sections[member]
-        rows = [ca.sum1(sections[12 + 3 * k : 15 + 3 * k, :] * fixed) for k in range(3)]
-        return ca.vertcat(*rows) / model.scales.length
+        return self._about(ca.mtimes(values, ca.sparsify(ca.DM(self._within(member, at.at_points))).T))
 
     def _rotations(self, member: str) -> ca.MX:
         model, at = self._model, self._stations(member)
@@ -551,10 +554,22 @@ class _Outputs:
             back = self._expressions.many(turned_vector(True), n)(opposite, moment)
             guess = self._expressions.many(spin_of(), n)(q, slope)
         function = self._expressions.many(share_of(model.space, len(names), NEWTON_STEPS), n)
-        about, along = function(back, guess, self._tendons[member], ca.repmat(tensions, 1, n))
+        natural, strain = self._natural_about(member)[3 - turns :, :], self._strain(member)
+        about, along = function(back, guess, natural, strain, self._tendons[member], ca.repmat(tensions, 1, n))
         turned = self._expressions.many(turned_vector(model.space), n)
         force = self._three(turned(q, along))
         return moment - (turned(q, about) if model.space else self._about(about)), force
+
+    def _strain(self, member: str) -> ca.MX:
+        """What stretch and shear add to the unit tangent before it is turned, (axes, places)."""
+        model, axes, at = self._model, self._expressions.axes, self._stations(member)
+        if not model.element.strains:
+            return ca.MX.zeros(axes, len(at.elements))
+        strains = self._places[:, np.maximum(model.segments.strains, 0).ravel().tolist()]
+        columns = ca.vertsplit(self._program.given.compliance, axes)
+        gained = sum((ca.repmat(strains[j, :], axes, 1) * column for j, column in enumerate(columns)), ca.MX(0))
+        weights = ca.DM(values_of(model.beams.weight).reshape(1, -1))
+        return self._points(gained / ca.repmat(weights, axes, 1), member, self._within(member, at.at_points))
 
     def _cut(self, member: str) -> ca.MX:
         """Moment through cuts, (3, places): that at the first node of the element, and what forces add."""
