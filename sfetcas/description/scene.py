@@ -428,6 +428,12 @@ def _check_tendons(scene: Scene) -> None:
             raise error.within("tendons", name) from None
         if scene.contacts:
             raise SceneError("found with contacts, accepted: without tendons", ("contacts",))
+        for way in tendon.way:
+            section = None if way.member is None else scene.members[way.member].section
+            law = None if section is None else scene.sections[section].law
+            if law is not None and not way.holes:
+                message = f"found the member {way.member!r}, whose section has the law {law.type!r}, accepted: discs, or"
+                raise SceneError(f"{message} a member without a law", ("tendons", name))
         if tendon.may_be_slack and (scene.analysis.type != "static" or scene.analysis.equilibria == "all"):
             what = "'all' equilibria" if scene.analysis.type == "static" else f"the analysis {scene.analysis.type!r}"
             message = f"found a length that is given with {what}, in which no tendon becomes slack, accepted: pushes ="
@@ -587,6 +593,10 @@ def _check_actuated(scene: Scene) -> None:
         if kind != "flexible":
             message = f"found the {kind} member {actuation.member!r}, accepted: a flexible one, which bends"
             raise SceneError(message, ("actuations", name, "member"))
+        law = scene.sections[str(scene.members[actuation.member].section)].law
+        if law is not None:
+            message = f"found the member {actuation.member!r}, whose section has the law {law.type!r}, accepted: one"
+            raise SceneError(f"{message} without a law", ("actuations", name, "member"))
     if scene.magnets and not scene.fields:
         raise SceneError("found magnets without a field, accepted: with [fields.NAME]", ("magnets",))
     if scene.fields and not scene.magnets:
