@@ -190,7 +190,7 @@ def test_buckling_against_the_field(dimension):
 
 
 def test_members_and_dipoles_and_rigid_ones_turn_alike():
-    """A rigid bar in a field between its axis and that of a spring: magnetised along it, or with a dipole at its end."""
+    """A rigid bar on a spring in a field across it: magnetised along it, or with a dipole at its end."""
 
     def bar(magnet):
         return Scene.from_dict(
@@ -529,30 +529,47 @@ def test_optimal_control(scene, control):
 # -- what is refused ------------------------------------------------------------------------------
 
 
+def natural(**keys):
+    return {"actuations": {"k": {"member": "m", **keys}}}
+
+
+def magnet(**keys):
+    return {"magnets": {"c": keys}, "fields": {"B": {"value": [1, 0]}}}
+
+
+def field(**keys):
+    return {"fields": {"B": keys}}
+
+
+ZERO = "found [0.0, 0.0, 0.0], accepted: a direction"
+SADDLE = [[1, 0, 0], [0, -1, 0], [0, 0, 0]]
+WELL = [[1, 0, 0], [0, 1, 0], [0, 0, 0]]
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"actuations": {"k": {"member": "n", "value": 1.0}}}, "actuations.k.member: found 'n', accepted: m"),
-        ({"actuations": {"k": {"member": "m"}}}, "actuations.k: the key 'value' is missing"),
-        ({"actuations": {"k": {"member": "m", "value": 1.0, "history": "h"}}}, "actuations.k.history: found 'h', but the scene has no histories"),
-        ({"actuations": {"k": {"member": "m", "value": 1.0, "span": [0.5, 0.2]}}}, "actuations.k.span: found [0.5, 0.2], accepted: [from, to]"),
-        ({"actuations": {"k": {"member": "m", "value": 1.0, "from": 0.2}}}, "actuations.k: unknown key 'from'"),
+        (natural(value=1.0, member="n"), "actuations.k.member: found 'n', accepted: m"),
+        (natural(), "actuations.k: the key 'value' is missing"),
+        (natural(value=1.0, history="h"), "actuations.k.history: found 'h', but the scene has no histories"),
+        (natural(value=1.0, span=[0.5, 0.2]), "actuations.k.span: found [0.5, 0.2], accepted: [from, to]"),
+        (natural(value=1.0, begin=0.2), "actuations.k: unknown key 'begin'"),
         ({"magnets": {"c": {"member": "m", "moment_density": [1, 0]}}}, "magnets: found magnets without a field"),
-        ({"fields": {"B": {"value": [1, 0]}}}, "fields: found a field without magnets"),
-        ({"magnets": {"c": {"member": "q", "moment_density": [1, 0]}}, "fields": {"B": {"value": [1, 0]}}}, "magnets.c.member: found 'q', accepted: m"),
-        ({"magnets": {"c": {"node": "q", "moment": [1, 0]}}, "fields": {"B": {"value": [1, 0]}}}, "magnets.c.node: found 'q', accepted: A, B"),
-        ({"magnets": {"c": {"member": "m", "moment_density": [0, 0]}}, "fields": {"B": {"value": [1, 0]}}}, "magnets.c.moment_density: found [0.0, 0.0, 0.0], accepted: a direction"),
-        ({"magnets": {"c": {"member": "m", "moment": [1, 0]}}, "fields": {"B": {"value": [1, 0]}}}, "magnets.c: the key 'moment_density' is missing: the magnet is along a member"),
-        ({"magnets": {"c": {"node": "B", "moment": [1, 0], "span": [0, 0.5]}}, "fields": {"B": {"value": [1, 0]}}}, "magnets.c.span: not accepted: the magnet is at a node"),
-        ({"magnets": {"c": {"moment": [1, 0]}}, "fields": {"B": {"value": [1, 0]}}}, "magnets.c: neither member nor node is given"),
-        ({"fields": {"B": {"type": "dipole", "moment": [0, 0]}}}, "fields.B.moment: found [0.0, 0.0, 0.0], accepted: a direction"),
-        ({"fields": {"B": {"type": "linear", "value": [0, 1]}}}, "fields.B: the key 'gradient' is missing"),
-        ({"fields": {"B": {"value": [0, 1], "gradient": [[1, 0, 0], [0, -1, 0], [0, 0, 0]]}}}, "fields.B.gradient: not accepted: the field is of type 'uniform'"),
-        ({"fields": {"B": {"type": "linear", "gradient": [[1, 0, 0], [0, 1, 0], [0, 0, 0]]}}}, "fields.B.gradient: found [[1.0, 0.0, 0.0]"),
-        ({"fields": {"B": {}}}, "fields.B: the key 'value' is missing"),
-        ({"dimension": "plane", "actuations": {"k": {"member": "m", "value": [1, 0, 0]}}}, "actuations.k.value: dimension is set to 'plane', but actuations.k.value bends or twists out of x-y"),
+        (field(value=[1, 0]), "fields: found a field without magnets"),
+        (magnet(member="q", moment_density=[1, 0]), "magnets.c.member: found 'q', accepted: m"),
+        (magnet(node="q", moment=[1, 0]), "magnets.c.node: found 'q', accepted: A, B"),
+        (magnet(member="m", moment_density=[0, 0]), f"magnets.c.moment_density: {ZERO}"),
+        (magnet(member="m", moment=[1, 0]), "magnets.c: the key 'moment_density' is missing: the magnet is along"),
+        (magnet(node="B", moment=[1, 0], span=[0, 0.5]), "magnets.c.span: not accepted: the magnet is at a node"),
+        (magnet(moment=[1, 0]), "magnets.c: neither member nor node is given"),
+        (field(type="dipole", moment=[0, 0]), f"fields.B.moment: {ZERO}"),
+        (field(type="linear", value=[0, 1]), "fields.B: the key 'gradient' is missing"),
+        (field(value=[0, 1], gradient=SADDLE), "fields.B.gradient: not accepted: the field is of type 'uniform'"),
+        (field(type="linear", gradient=WELL), "fields.B.gradient: found [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]"),
+        (field(), "fields.B: the key 'value' is missing"),
+        ({"dimension": "plane", **natural(value=[1, 0, 0])}, "actuations.k.value: dimension is set to 'plane'"),
     ],
-)  # fmt: skip
+)
 def test_what_is_not_accepted(change, sentence):
     with pytest.raises(SceneError, match=re.escape(sentence)):
         strip(**change)
@@ -560,7 +577,9 @@ def test_what_is_not_accepted(change, sentence):
 
 def test_rigid_members_have_no_natural_curvature_and_gauss_points_no_magnets():
     rigid = {"m": {"nodes": ["A", "B"], "section": "s", "type": "rigid"}}
-    with pytest.raises(SceneError, match="actuations.k.member: found the rigid member 'm', accepted: a flexible one"):
+    with pytest.raises(
+        SceneError, match=r"actuations\.k\.member: found the rigid member 'm', accepted: a flexible one"
+    ):
         actuated(1.0, more={"members": rigid})
     with pytest.raises(SceneError, match="magnetised members need integration at the nodes"):
         sfetcas.solve(magnetised([0, 1.0]), Settings(gauss=True))

@@ -111,6 +111,7 @@ def every_kind():
         {**plane, "springs": stopped, "loads": force},
         {**clamped, "springs": pulled, "motions": moved},
         {**clamped, "contacts": floor, "loads": force},
+        {**clamped, "fields": {"B": {"value": [0, 1]}}, "magnets": {"end": {"node": "B", "moment": [1, 0]}}},
     ):
         yield solve(Scene.from_dict(table)).last
 
@@ -134,5 +135,5 @@ def test_all_that_an_answer_tells_has_a_name_by_which_it_is_found():
     assert met == {kind.name for kind in ANSWERS if "statics" in kind.where} - others
 
 
-LATER = ("springs", "motions", "contacts")
+LATER = ("springs", "motions", "magnets", "contacts")
 """Tables of a scene whose names are those of the answer."""
