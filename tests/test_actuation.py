@@ -150,6 +150,32 @@ def test_histories_and_factors():
     assert [step.angle("B") for step in steps] == pytest.approx([0.5 + 0.3, 1.0 + 0.6], abs=1e-9)
 
 
+FLOOR = {"floor": {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "m"}}
+
+
+def test_strip_that_curls_into_the_floor_is_pressed_there_by_its_end():
+    """Small curvature k: the force at the end is 3/2 EI k / L, as the deflection there is zero."""
+    found = sfetcas.solve(actuated(-0.05, more={"contacts": FLOOR}), accuracy=1e-8).last
+    assert found.contacts["floor"]["at"] == 1.0
+    # Of what is small the square is left out.
+    assert found.contacts["floor"]["force"][1] == pytest.approx(1.5 * 2.0 * 0.05, rel=1e-4)
+
+
+def test_heavy_strip_that_curls_off_the_floor_lies_as_one_that_was_made_so():
+    more = {"contacts": FLOOR, "gravity": [0, -9.81]}
+    one = sfetcas.solve(actuated(0.8, more=more), accuracy=1e-6).last
+    place, _ = screwed([0, 0, 0.8])
+    nodes = {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": place.tolist()}}
+    shape = {"type": "curvature", "length": 1.0, "start": [1, 0, 0], "kappa3": [0.8]}
+    members = {"m": {"nodes": ["A", "B"], "section": "s", "shape": shape}}
+    other = sfetcas.solve(strip(nodes=nodes, members=members, **more), accuracy=1e-6).last
+    assert one.contacts["floor"]["at"][1] > 0.2
+    np.testing.assert_allclose(one.contacts["floor"]["at"], other.contacts["floor"]["at"], atol=1e-5)
+    x = np.array([0.0, 0.1, 0.5, 0.9])
+    for key in ("position", "moment", "force", "curvature"):
+        np.testing.assert_allclose(one.along("m", x)[key], other.along("m", x)[key], atol=1e-5)
+
+
 # -- magnets in uniform fields --------------------------------------------------------------------
 
 ELASTICA = {1: (0.94356676, 0.30172077), 5: (0.61237164, 0.71379152), 10: (0.44500440, 0.81060902)}
@@ -567,6 +593,14 @@ WELL = [[1, 0, 0], [0, 1, 0], [0, 0, 0]]
         (field(value=[0, 1], gradient=SADDLE), "fields.B.gradient: not accepted: the field is of type 'uniform'"),
         (field(type="linear", gradient=WELL), "fields.B.gradient: found [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]"),
         (field(), "fields.B: the key 'value' is missing"),
+        (
+            {"contacts": FLOOR, **magnet(member="m", moment_density=[1, 0])},
+            "magnets.c.member: found 'm', which may touch",
+        ),
+        (
+            {"contacts": FLOOR, **magnet(node="B", moment=[1, 0]), **field(type="linear", gradient=SADDLE)},
+            "fields.B.type: found a field with a gradient and contacts",
+        ),
         ({"dimension": "plane", **natural(value=[1, 0, 0])}, "actuations.k.value: dimension is set to 'plane'"),
     ],
 )
