@@ -255,6 +255,10 @@ def _report_step(step: Equilibrium, place: str, said: set[str]) -> None:
         units = {key: answer_name(f"motions.{name}.{key}").kind.unit for key in efforts}
         texts = (f"{key} {_effort(value, sizes[units[key]])} {units[key]}" for key, value in efforts.items())
         print(f"  motion {name}: {', '.join(texts)}")
+    for name in step.model.scene.magnets:
+        found = step.magnet(name)
+        torque, force = _vector(found["torque"], sizes["N m"]), _vector(found["force"], sizes["N"])
+        print(f"  magnet {name}: torque {torque} N m, force {force} N")
     for name, entry in step.contacts.items():
         _report_contact(name, entry, sizes["N"])
     proof = step.certificate

@@ -150,6 +150,32 @@ def test_histories_and_factors():
     assert [step.angle("B") for step in steps] == pytest.approx([0.5 + 0.3, 1.0 + 0.6], abs=1e-9)
 
 
+FLOOR = {"floor": {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "m"}}
+
+
+def test_strip_that_curls_into_the_floor_is_pressed_there_by_its_end():
+    """Small curvature k: the force at the end is 3/2 EI k / L, as the deflection there is zero."""
+    found = sfetcas.solve(actuated(-0.05, more={"contacts": FLOOR}), accuracy=1e-8).last
+    assert found.contacts["floor"]["at"] == 1.0
+    # Of what is small the square is left out.
+    assert found.contacts["floor"]["force"][1] == pytest.approx(1.5 * 2.0 * 0.05, rel=1e-4)
+
+
+def test_heavy_strip_that_curls_off_the_floor_lies_as_one_that_was_made_so():
+    more = {"contacts": FLOOR, "gravity": [0, -9.81]}
+    one = sfetcas.solve(actuated(0.8, more=more), accuracy=1e-6).last
+    place, _ = screwed([0, 0, 0.8])
+    nodes = {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": place.tolist()}}
+    shape = {"type": "curvature", "length": 1.0, "start": [1, 0, 0], "kappa3": [0.8]}
+    members = {"m": {"nodes": ["A", "B"], "section": "s", "shape": shape}}
+    other = sfetcas.solve(strip(nodes=nodes, members=members, **more), accuracy=1e-6).last
+    assert one.contacts["floor"]["at"][1] > 0.2
+    np.testing.assert_allclose(one.contacts["floor"]["at"], other.contacts["floor"]["at"], atol=1e-5)
+    x = np.array([0.0, 0.1, 0.5, 0.9])
+    for key in ("position", "moment", "force", "curvature"):
+        np.testing.assert_allclose(one.along("m", x)[key], other.along("m", x)[key], atol=1e-5)
+
+
 # -- magnets in uniform fields --------------------------------------------------------------------
 
 ELASTICA = {1: (0.94356676, 0.30172077), 5: (0.61237164, 0.71379152), 10: (0.44500440, 0.81060902)}
@@ -190,7 +216,7 @@ def test_buckling_against_the_field(dimension):
 
 
 def test_members_and_dipoles_and_rigid_ones_turn_alike():
-    """A rigid bar in a field between its axis and that of a spring: magnetised along it, or with a dipole at its end."""
+    """A rigid bar on a spring in a field across it: magnetised along it, or with a dipole at its end."""
 
     def bar(magnet):
         return Scene.from_dict(
@@ -529,30 +555,55 @@ def test_optimal_control(scene, control):
 # -- what is refused ------------------------------------------------------------------------------
 
 
+def natural(**keys):
+    return {"actuations": {"k": {"member": "m", **keys}}}
+
+
+def magnet(**keys):
+    return {"magnets": {"c": keys}, "fields": {"B": {"value": [1, 0]}}}
+
+
+def field(**keys):
+    return {"fields": {"B": keys}}
+
+
+ZERO = "found [0.0, 0.0, 0.0], accepted: a direction"
+SADDLE = [[1, 0, 0], [0, -1, 0], [0, 0, 0]]
+WELL = [[1, 0, 0], [0, 1, 0], [0, 0, 0]]
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"actuations": {"k": {"member": "n", "value": 1.0}}}, "actuations.k.member: found 'n', accepted: m"),
-        ({"actuations": {"k": {"member": "m"}}}, "actuations.k: the key 'value' is missing"),
-        ({"actuations": {"k": {"member": "m", "value": 1.0, "history": "h"}}}, "actuations.k.history: found 'h', but the scene has no histories"),
-        ({"actuations": {"k": {"member": "m", "value": 1.0, "span": [0.5, 0.2]}}}, "actuations.k.span: found [0.5, 0.2], accepted: [from, to]"),
-        ({"actuations": {"k": {"member": "m", "value": 1.0, "from": 0.2}}}, "actuations.k: unknown key 'from'"),
+        (natural(value=1.0, member="n"), "actuations.k.member: found 'n', accepted: m"),
+        (natural(), "actuations.k: the key 'value' is missing"),
+        (natural(value=1.0, history="h"), "actuations.k.history: found 'h', but the scene has no histories"),
+        (natural(value=1.0, span=[0.5, 0.2]), "actuations.k.span: found [0.5, 0.2], accepted: [from, to]"),
+        (natural(value=1.0, begin=0.2), "actuations.k: unknown key 'begin'"),
         ({"magnets": {"c": {"member": "m", "moment_density": [1, 0]}}}, "magnets: found magnets without a field"),
-        ({"fields": {"B": {"value": [1, 0]}}}, "fields: found a field without magnets"),
-        ({"magnets": {"c": {"member": "q", "moment_density": [1, 0]}}, "fields": {"B": {"value": [1, 0]}}}, "magnets.c.member: found 'q', accepted: m"),
-        ({"magnets": {"c": {"node": "q", "moment": [1, 0]}}, "fields": {"B": {"value": [1, 0]}}}, "magnets.c.node: found 'q', accepted: A, B"),
-        ({"magnets": {"c": {"member": "m", "moment_density": [0, 0]}}, "fields": {"B": {"value": [1, 0]}}}, "magnets.c.moment_density: found [0.0, 0.0, 0.0], accepted: a direction"),
-        ({"magnets": {"c": {"member": "m", "moment": [1, 0]}}, "fields": {"B": {"value": [1, 0]}}}, "magnets.c: the key 'moment_density' is missing: the magnet is along a member"),
-        ({"magnets": {"c": {"node": "B", "moment": [1, 0], "span": [0, 0.5]}}, "fields": {"B": {"value": [1, 0]}}}, "magnets.c.span: not accepted: the magnet is at a node"),
-        ({"magnets": {"c": {"moment": [1, 0]}}, "fields": {"B": {"value": [1, 0]}}}, "magnets.c: neither member nor node is given"),
-        ({"fields": {"B": {"type": "dipole", "moment": [0, 0]}}}, "fields.B.moment: found [0.0, 0.0, 0.0], accepted: a direction"),
-        ({"fields": {"B": {"type": "linear", "value": [0, 1]}}}, "fields.B: the key 'gradient' is missing"),
-        ({"fields": {"B": {"value": [0, 1], "gradient": [[1, 0, 0], [0, -1, 0], [0, 0, 0]]}}}, "fields.B.gradient: not accepted: the field is of type 'uniform'"),
-        ({"fields": {"B": {"type": "linear", "gradient": [[1, 0, 0], [0, 1, 0], [0, 0, 0]]}}}, "fields.B.gradient: found [[1.0, 0.0, 0.0]"),
-        ({"fields": {"B": {}}}, "fields.B: the key 'value' is missing"),
-        ({"dimension": "plane", "actuations": {"k": {"member": "m", "value": [1, 0, 0]}}}, "actuations.k.value: dimension is set to 'plane', but actuations.k.value bends or twists out of x-y"),
+        (field(value=[1, 0]), "fields: found a field without magnets"),
+        (magnet(member="q", moment_density=[1, 0]), "magnets.c.member: found 'q', accepted: m"),
+        (magnet(node="q", moment=[1, 0]), "magnets.c.node: found 'q', accepted: A, B"),
+        (magnet(member="m", moment_density=[0, 0]), f"magnets.c.moment_density: {ZERO}"),
+        (magnet(member="m", moment=[1, 0]), "magnets.c: the key 'moment_density' is missing: the magnet is along"),
+        (magnet(node="B", moment=[1, 0], span=[0, 0.5]), "magnets.c.span: not accepted: the magnet is at a node"),
+        (magnet(moment=[1, 0]), "magnets.c: neither member nor node is given"),
+        (field(type="dipole", moment=[0, 0]), f"fields.B.moment: {ZERO}"),
+        (field(type="linear", value=[0, 1]), "fields.B: the key 'gradient' is missing"),
+        (field(value=[0, 1], gradient=SADDLE), "fields.B.gradient: not accepted: the field is of type 'uniform'"),
+        (field(type="linear", gradient=WELL), "fields.B.gradient: found [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]"),
+        (field(), "fields.B: the key 'value' is missing"),
+        (
+            {"contacts": FLOOR, **magnet(member="m", moment_density=[1, 0])},
+            "magnets.c.member: found 'm', which may touch",
+        ),
+        (
+            {"contacts": FLOOR, **magnet(node="B", moment=[1, 0]), **field(type="linear", gradient=SADDLE)},
+            "fields.B.type: found a field with a gradient and contacts",
+        ),
+        ({"dimension": "plane", **natural(value=[1, 0, 0])}, "actuations.k.value: dimension is set to 'plane'"),
     ],
-)  # fmt: skip
+)
 def test_what_is_not_accepted(change, sentence):
     with pytest.raises(SceneError, match=re.escape(sentence)):
         strip(**change)
@@ -560,7 +611,9 @@ def test_what_is_not_accepted(change, sentence):
 
 def test_rigid_members_have_no_natural_curvature_and_gauss_points_no_magnets():
     rigid = {"m": {"nodes": ["A", "B"], "section": "s", "type": "rigid"}}
-    with pytest.raises(SceneError, match="actuations.k.member: found the rigid member 'm', accepted: a flexible one"):
+    with pytest.raises(
+        SceneError, match=r"actuations\.k\.member: found the rigid member 'm', accepted: a flexible one"
+    ):
         actuated(1.0, more={"members": rigid})
     with pytest.raises(SceneError, match="magnetised members need integration at the nodes"):
         sfetcas.solve(magnetised([0, 1.0]), Settings(gauss=True))

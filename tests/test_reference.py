@@ -113,6 +113,7 @@ def every_kind():
         {**clamped, "sections": stretching, "springs": pulled, "motions": moved},
         {**clamped, "contacts": floor, "loads": force},
         {**clamped, "tendons": {"t": {"way": [{"member": "m", "offset": 0.1}], "pull": 0.01}}},
+        {**clamped, "fields": {"B": {"value": [0, 1]}}, "magnets": {"end": {"node": "B", "moment": [1, 0]}}},
     ):
         yield solve(Scene.from_dict(table)).last
 
@@ -136,5 +137,5 @@ def test_all_that_an_answer_tells_has_a_name_by_which_it_is_found():
     assert met == {kind.name for kind in ANSWERS if "statics" in kind.where} - others
 
 
-LATER = ("springs", "tendons", "motions", "contacts")
+LATER = ("springs", "tendons", "motions", "magnets", "contacts")
 """Tables of a scene whose names are those of the answer."""

@@ -692,6 +692,11 @@ def _check_contacts(scene: Scene) -> None:
     if scene.contacts and scene.analysis.equilibria == "all":
         message = "found 'all' with contacts, accepted: 'one'; a node's 'start' chooses among several"
         raise SceneError(message, ("analysis", "equilibria"))
+    uneven = [name for name, field in scene.fields.items() if not field.uniform]
+    if scene.contacts and uneven:
+        message = "found a field with a gradient and contacts, accepted: a uniform field, or no contacts"
+        raise SceneError(message, ("fields", uneven[0], "type"))
+    magnetised = {magnet.member: name for name, magnet in scene.magnets.items()}
     for name, contact in scene.contacts.items():
         _known(contact.member, scene.members, "members", "contacts", name, "member")
         for member in contact.members if isinstance(contact.members, tuple) else ():
@@ -700,6 +705,11 @@ def _check_contacts(scene: Scene) -> None:
             message = f"found a point, accepted in space: a line, as {scene.dimension_reason}"
             raise SceneError(message, ("contacts", name, "type"))
         for member in members_of(contact, scene.members):
+            if member in magnetised:
+                message = (
+                    f"found {member!r}, which may touch {name!r}, accepted: a member that touches nothing, or dipoles"
+                )
+                raise SceneError(f"{message} at its nodes", ("magnets", magnetised[member], "member"))
             if scene.members[member].type == "small":
                 accepted = "flexible and rigid members, whose shape between their ends is known"
                 raise SceneError(

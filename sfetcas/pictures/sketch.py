@@ -21,8 +21,11 @@ from ..mathematics.arrays import Array
 
 __all__ = [
     "BEHIND",
+    "FIELD",
     "LOAD",
+    "MAGNET",
     "MOTION",
+    "NATURAL",
     "REACTION",
     "REST",
     "SUPPORT",

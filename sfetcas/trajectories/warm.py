@@ -27,7 +27,7 @@ __all__ = ["at_rest", "carried_over", "restaged", "rigid", "straight"]
 
 
 def rigid(scene: Scene) -> Scene | None:
-    """The scene with its flexible members made rigid; None where no member is flexible, or natural curvature bends some."""
+    """The scene with its flexible members made rigid; None where none is flexible, or natural curvature bends some."""
     flexible = [name for name, member in scene.members.items() if member.type == "flexible"]
     if not flexible or scene.actuations:
         return None
