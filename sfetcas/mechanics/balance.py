@@ -109,18 +109,18 @@ class Balance:
         """The part of a moment (3,) on a rotation that the ground takes: none about axes that are free."""
         return self._reactions.fixed_directions(number) @ moment
 
+    @functools.cached_property
+    def _starting(self) -> Array:
+        """Moments that the surroundings exert on the first nodes of all elements, about the axes that turn."""
+        found = self._shares[0][:, : self._turns]
+        for group, shares in zip(self.model.terms, self._shares, strict=True):
+            if group.kind.along_element and not group.kind.is_load:
+                found = found + scattered(len(found), elements_of(group), shares[:, : self._turns])
+        return found
+
     def starting_moments(self, elements: slice) -> Array:
         """Moments (n, 3) that the surroundings exert on the first nodes of elements."""
-        found = self._shares[0][elements, : self._turns]
-        for number, group in enumerate(self.model.terms):
-            if group.kind.along_element and not group.kind.is_load:
-                found = (
-                    found
-                    + scattered(len(self._shares[0]), elements_of(group), self._shares[number][:, : self._turns])[
-                        elements
-                    ]
-                )
-        return self._three(found)
+        return self._three(self._starting[elements])
 
     def start_moment(self, member: str) -> Array:
         """Moment (3,) that the surroundings exert on the first end of a flexible or rigid member."""
