@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq, root
+from scipy.spatial.transform import Rotation
 from test_codegen import built, needs_compiler, said
 
 import sfetcas
@@ -250,6 +251,30 @@ def test_curved_member():
     )
 
 
+@pytest.mark.parametrize("gauss", [False, True], ids=["nodes", "gauss"])
+def test_turned_scene(gauss):
+    """Member, axis b2 and load turned by any rotation: the answer turns with them."""
+    law = {
+        "type": "potential",
+        "potential": lambda k: 0.5 * ca.sumsqr(k) + 0.3 * k[0] * k[1] + 0.1 * (k[2] + k[1]) ** 4,
+    }
+    turn = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
+    load, tips = np.array([-0.3, 1.2, 0.8]), []
+    for axes in (np.eye(3), turn):
+        one = scene(law, force((axes @ load).tolist()), dimension="space").replace(
+            {"nodes.B.position": axes[:, 0].tolist(), "members.beam.b2": axes[:, 1].tolist()}
+        )
+        found = sfetcas.solve(one, gauss=gauss).last
+        curvature = found.fields.along("beam", np.array([0.0]))["curvature"]
+        tips.append((axes.T @ found.position("B"), axes.T @ found.reaction("A")[1], curvature))
+    for one, other in zip(*tips, strict=True):
+        # Two runs to the accuracy of 1e-8.
+        np.testing.assert_allclose(one, other, atol=1e-7)
+    moment, k = -tips[0][1], tips[0][2][0]
+    slopes = k + 0.3 * np.array([k[1], k[0], 0.0]) + 0.4 * (k[2] + k[1]) ** 3 * np.array([0.0, 1.0, 1.0])
+    np.testing.assert_allclose(moment, slopes, atol=1e-7)
+
+
 # -- analyses --------------------------------------------------------------------------------------------
 
 
@@ -295,7 +320,9 @@ def test_motion_keeps_energy(integrator):
 def test_parameters():
     """Derivatives of the answer by numbers of the laws, from the formula of the arc."""
     family = sfetcas.parametric(
-        scene(RAMBERG), ["sections.s.law.moment", "sections.s.law.exponent", "sections.s.EI3"], ["nodes.B.angle"]
+        scene(RAMBERG),
+        ["sections.s.law.moment", "sections.s.law.exponent", "sections.s.EI3"],
+        ["nodes.B.angle", "members.beam.energy", "members.beam.moment at 0.5"],
     )
     values = {"sections.s.law.moment": 1.1, "sections.s.law.exponent": 3.5, "sections.s.EI3": 1.3}
     answer = family.solve(values)
@@ -304,6 +331,12 @@ def test_parameters():
         return 1.5 / stiffness + 0.3 * moment / stiffness * (1.5 / moment) ** exponent
 
     assert answer["nodes.B.angle"] == pytest.approx(angle(*values.values()), abs=1e-6)
+    moment, exponent, stiffness = values.values()
+    # 1.5 times the angle, less the complementary energy.
+    complementary = 1.5**2 / 2.0 + 0.3 * 1.5 ** (exponent + 1.0) / moment ** (exponent - 1.0) / (exponent + 1.0)
+    energy = 1.5 * angle(*values.values()) - complementary / stiffness
+    assert answer["members.beam.energy"] == pytest.approx(energy, abs=1e-6)
+    assert answer["members.beam.moment at 0.5"][2] == pytest.approx(1.5, abs=1e-9)
     for i, name in enumerate(values):
         step = np.eye(3)[i] * 1e-5
         at = np.array(list(values.values()))
