@@ -1,5 +1,6 @@
 """Sections whose moment is not proportional to the change of the curvature: every analysis, by independent ways."""
 
+import pickle
 import re
 from dataclasses import replace
 
@@ -8,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
+from scipy.optimize import brentq, root
+from scipy.spatial.transform import Rotation
 from test_codegen import built, needs_compiler, said
 
 import sfetcas
@@ -149,6 +151,65 @@ def test_force(law):
     assert found.certificate.stable is True
 
 
+def kinked(load):
+    """Tip of the bilinear cantilever by shooting in pieces between the kinks."""
+
+    def course(angle):
+        def rates(_, y):
+            return [
+                np.cos(y[2]),
+                np.sin(y[2]),
+                -curvature_of(BILINEAR, y[3]),
+                load[1] * np.cos(y[2]) - load[0] * np.sin(y[2]),
+            ]
+
+        def yields(_, y):
+            return y[3] - 1.0
+
+        yields.terminal, yields.direction = True, 1.0
+        way = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853", "max_step": 0.05}
+        first = solve_ivp(rates, (0, 1), [0, 0, angle, 0], events=yields, **way)
+        return solve_ivp(rates, (first.t[-1], 1), first.y[:, -1], **way).y[:, -1]
+
+    return course(brentq(lambda angle: course(angle)[2], 0.1, 1.8, xtol=1e-13))[:2]
+
+
+@pytest.mark.parametrize("accuracy", [1e-4, 1e-6, 1e-8])
+def test_accuracy_with_a_kink(accuracy):
+    """Where the stiffness jumps within an element the mesh follows, and the estimate holds."""
+    found = sfetcas.solve(scene(BILINEAR, force([-0.3, 1.5])), accuracy=accuracy).last
+    error = np.abs(found.position("B")[:2] - kinked([-0.3, 1.5])).max()
+    assert error < found.certificate.error_estimate <= accuracy
+
+
+@pytest.mark.parametrize("solver", ["ipopt", "newton"])
+def test_solvers_meet_kinks(solver):
+    found = sfetcas.solve(scene(BILINEAR, force([-0.3, 1.5])), accuracy=1e-6, solver=solver).last
+    np.testing.assert_allclose(found.position("B")[:2], kinked([-0.3, 1.5]), atol=1e-6)
+
+
+def test_all_equilibria():
+    """A column beyond its critical load that softens: both sides of the post-buckled shape and the straight one."""
+    one = scene(RAMBERG, force([-2.6, 0.0]), analysis={"equilibria": "all", "accuracy": 1e-6})
+    found = sfetcas.solve(one).steps
+    ways = sorted((round(float(step.position("B")[1]), 4), step.certificate.negative) for step in found)
+    assert len(found) >= 3
+    assert ways[0][0] == -ways[-1][0] < -0.1
+    assert (0.0, 1) in ways
+
+
+def test_copies():
+    """Scenes with laws go to other processes, and by name to other values."""
+    for law in (QUARTIC, TABLE, BILINEAR):
+        assert pickle.loads(pickle.dumps(scene(law))) == scene(law)
+    softer = scene(BILINEAR).replace({"sections.s.law.moment": 0.5})
+    assert softer.sections["s"].law == sfetcas.Bilinear(moment=0.5, ratio=0.2)
+    swept = sfetcas.sweep(
+        scene(BILINEAR), sfetcas.grid({"sections.s.law.ratio": [0.2, 0.5]}), ["nodes.B.angle"], workers=1
+    )
+    np.testing.assert_allclose(np.ravel(swept.values("nodes.B.angle")), [3.5, 2.0], atol=1e-6)
+
+
 def test_moments_are_slopes_of_the_potential():
     """Moments by balance meet dW/dkappa of the curvature of the elements, with the order of the elements."""
     miss = []
@@ -188,6 +249,30 @@ def test_curved_member():
     np.testing.assert_allclose(
         sfetcas.solve(one).last.position("B")[:2], arc(1.0 + curvature_of(RAMBERG, 1.5)), atol=1e-8
     )
+
+
+@pytest.mark.parametrize("gauss", [False, True], ids=["nodes", "gauss"])
+def test_turned_scene(gauss):
+    """Member, axis b2 and load turned by any rotation: the answer turns with them."""
+    law = {
+        "type": "potential",
+        "potential": lambda k: 0.5 * ca.sumsqr(k) + 0.3 * k[0] * k[1] + 0.1 * (k[2] + k[1]) ** 4,
+    }
+    turn = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
+    load, tips = np.array([-0.3, 1.2, 0.8]), []
+    for axes in (np.eye(3), turn):
+        one = scene(law, force((axes @ load).tolist()), dimension="space").replace(
+            {"nodes.B.position": axes[:, 0].tolist(), "members.beam.b2": axes[:, 1].tolist()}
+        )
+        found = sfetcas.solve(one, gauss=gauss).last
+        curvature = found.fields.along("beam", np.array([0.0]))["curvature"]
+        tips.append((axes.T @ found.position("B"), axes.T @ found.reaction("A")[1], curvature))
+    for one, other in zip(*tips, strict=True):
+        # Two runs to the accuracy of 1e-8.
+        np.testing.assert_allclose(one, other, atol=1e-7)
+    moment, k = -tips[0][1], tips[0][2][0]
+    slopes = k + 0.3 * np.array([k[1], k[0], 0.0]) + 0.4 * (k[2] + k[1]) ** 3 * np.array([0.0, 1.0, 1.0])
+    np.testing.assert_allclose(moment, slopes, atol=1e-7)
 
 
 # -- analyses --------------------------------------------------------------------------------------------
@@ -235,7 +320,9 @@ def test_motion_keeps_energy(integrator):
 def test_parameters():
     """Derivatives of the answer by numbers of the laws, from the formula of the arc."""
     family = sfetcas.parametric(
-        scene(RAMBERG), ["sections.s.law.moment", "sections.s.law.exponent", "sections.s.EI3"], ["nodes.B.angle"]
+        scene(RAMBERG),
+        ["sections.s.law.moment", "sections.s.law.exponent", "sections.s.EI3"],
+        ["nodes.B.angle", "members.beam.energy", "members.beam.moment at 0.5"],
     )
     values = {"sections.s.law.moment": 1.1, "sections.s.law.exponent": 3.5, "sections.s.EI3": 1.3}
     answer = family.solve(values)
@@ -244,6 +331,12 @@ def test_parameters():
         return 1.5 / stiffness + 0.3 * moment / stiffness * (1.5 / moment) ** exponent
 
     assert answer["nodes.B.angle"] == pytest.approx(angle(*values.values()), abs=1e-6)
+    moment, exponent, stiffness = values.values()
+    # 1.5 times the angle, less the complementary energy.
+    complementary = 1.5**2 / 2.0 + 0.3 * 1.5 ** (exponent + 1.0) / moment ** (exponent - 1.0) / (exponent + 1.0)
+    energy = 1.5 * angle(*values.values()) - complementary / stiffness
+    assert answer["members.beam.energy"] == pytest.approx(energy, abs=1e-6)
+    assert answer["members.beam.moment at 0.5"][2] == pytest.approx(1.5, abs=1e-9)
     for i, name in enumerate(values):
         step = np.eye(3)[i] * 1e-5
         at = np.array(list(values.values()))
@@ -489,6 +582,56 @@ def test_ribbon_tends_to_sadowsky():
         miss.append(abs(potential(RIBBON, [t, 0.0, k]) / sadowsky - 1.0))
     assert miss[1] < 2e-3
     assert miss[0] / miss[1] == pytest.approx(10.0, rel=0.1)
+
+
+def ribbon_energy(t, b, k):
+    """The formula of the ribbon for RIBBON, also of complex numbers; E w^3 h/12 about the stiff axis."""
+    width, thick, young, nu = (RIBBON[key] for key in ("width", "height", "E", "nu"))
+    plate, size = young * thick**3 / (12.0 * (1.0 - nu**2)), np.sqrt(k * k)
+    x = np.sqrt(width * np.sqrt(3.0 * (1.0 - nu**2)) * width / thick * size)
+    share = 1.0 - 2.0 / x * (np.cosh(x) - np.cos(x)) / (np.sinh(x) + np.sin(x))
+    bent = (1.0 - nu**2) * k**2 + 2.0 * (1.0 - nu) * t**2 + (nu * k**2 + t**2) ** 2 / k**2 * share
+    return 0.5 * plate * width * bent + 0.5 * young * thick * width**3 / 12.0 * b**2
+
+
+def test_ribbon_by_shooting():
+    """A ribbon clamped at one end under a force across at the other one, twisted by it, in space."""
+    load = np.array([0.0, 0.004, -0.03])
+
+    def moments(change):
+        """Of the formula, by complex steps."""
+        return np.array([ribbon_energy(*(change + 1e-30j * axis)).imag / 1e-30 for axis in np.eye(3)])
+
+    def curvatures(moment, near):
+        found = root(lambda c: moments(c) - moment, near, tol=1e-14)
+        return found.x
+
+    rest = CrossSection(**RIBBON).stiffness([0.0])[0]
+
+    def end(moment, length=0.1):
+        near = [np.zeros(3)]
+
+        def rates(_, y):
+            axes, m = y[3:12].reshape(3, 3), y[12:]
+            own = axes.T @ m
+            near[0] = curvatures(own, near[0] if near[0].any() else own / rest + 1e-3)
+            return [*axes[:, 0], *np.cross(axes @ near[0], axes.T).T.ravel(), *-np.cross(axes[:, 0], load)]
+
+        # b2 along z, so that b3 is against y.
+        start = np.stack([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]], axis=1)
+        return solve_ivp(rates, (0, 0.999 * length), [0, 0, 0, *start.ravel(), *moment], rtol=1e-8, atol=1e-10).y[:, -1]
+
+    one = scene(section=RIBBON, load=force(load.tolist()), dimension="space").replace(
+        {"nodes.B.position": [0.1, 0, 0], "members.beam.b2": [0, 0, 1]}
+    )
+    found = sfetcas.solve(one, accuracy=1e-8).last
+    along = found.fields.along("beam", np.array([0.0, 0.999]))
+    last = end(along["moment"][0])
+    # The shooting stops short of the free end, where the curvature vanishes and the formula of the profile is 0/0.
+    np.testing.assert_allclose(last[:3], along["position"][1], atol=1e-7)
+    np.testing.assert_allclose(last[12:], along["moment"][1], atol=1e-9)
+    straight = sfetcas.solve(one.replace({"sections.s.law": None}), accuracy=1e-8).last
+    assert np.abs(straight.position("B") - found.position("B")).max() > 1e-3
 
 
 # -- what is told and refused ----------------------------------------------------------------------------
