@@ -174,10 +174,10 @@ class Element(Term):
             return super().rotation_gradient()
         symbols, q, stiffness, tangent, load, pull = self._large_symbols()
         strain, tangents, gradient, hessian, change = self._point.map(self.order + 1)(
-            *self._at(q), stiffness, tangent, pull
+            *self.at(q), stiffness, tangent, pull
         )
-        by_q, basis, gained = self._on_nodes(gradient), self._basis(q), tangents - tangent
-        matrix = ca.mtimes(basis.T, ca.mtimes(self._between_nodes(hessian), basis))
+        by_q, basis, gained = self.on_nodes(gradient), self.basis(q), tangents - tangent
+        matrix = ca.mtimes(basis.T, ca.mtimes(self.between_nodes(hessian), basis))
         # What keeps quaternions on the unit sphere.
         matrix -= 0.25 * ca.diag(ca.vec(ca.repmat(ca.sum1(q * by_q), 3, 1)))
         results = {
@@ -195,8 +195,8 @@ class Element(Term):
         if not self.space:
             return super().rotation_forces()
         symbols, q, stiffness, tangent, _, pull = self._large_symbols()
-        tangents, gradient, _ = self._of_point("gradient").map(self.order + 1)(*self._at(q), stiffness, tangent, pull)
-        moments = ca.mtimes(self._basis(q).T, ca.vec(self._on_nodes(gradient)))
+        tangents, gradient, _ = self._of_point("gradient").map(self.order + 1)(*self.at(q), stiffness, tangent, pull)
+        moments = ca.mtimes(self.basis(q).T, ca.vec(self.on_nodes(gradient)))
         return self._function("forces", symbols, {"rows": ca.sum2(tangents - tangent), "gradient": ca.densify(moments)})
 
     def slopes(self) -> ca.Function:
@@ -204,8 +204,8 @@ class Element(Term):
         if not self.space:
             return super().slopes()
         symbols, q, stiffness, tangent, load, _ = self._large_symbols()
-        _, gradient, change = self._of_point("gradient").map(self.order + 1)(*self._at(q), stiffness, tangent, load)
-        results = {"gradient": ca.densify(ca.vec(self._on_nodes(gradient))), "jacobian": self._by_nodes(change)}
+        _, gradient, change = self._of_point("gradient").map(self.order + 1)(*self.at(q), stiffness, tangent, load)
+        results = {"gradient": ca.densify(ca.vec(self.on_nodes(gradient))), "jacobian": self._by_nodes(change)}
         return self._function("slopes", symbols[:4], results)
 
     def curvatures(self) -> ca.Function:
@@ -215,8 +215,8 @@ class Element(Term):
         symbols, q, stiffness, tangent, load, _ = self._large_symbols()
         weight = ca.MX.sym("weight")
         pull = weight * load + ca.repmat(symbols[4], 1, self.order + 1)
-        hessian = self._of_point("hessian").map(self.order + 1)(*self._at(q), weight * stiffness, tangent, pull)
-        return self._function("curvatures", [*symbols, weight], {"hessian": self._between_nodes(hessian)})
+        hessian = self._of_point("hessian").map(self.order + 1)(*self.at(q), weight * stiffness, tangent, pull)
+        return self._function("curvatures", [*symbols, weight], {"hessian": self.between_nodes(hessian)})
 
     @functools.cached_property
     def convex(self) -> ca.Function:
@@ -242,12 +242,12 @@ class Element(Term):
 
     def _convex_in_space(self, q: ca.MX, stiffness: ca.MX, tangent: ca.MX, pull: ca.MX) -> ca.MX:
         n = self.order + 1
-        hessian, across = self._convex_point.map(n)(*self._at(q), stiffness, tangent, pull)
-        basis = self._basis(q)
+        hessian, across = self._convex_point.map(n)(*self.at(q), stiffness, tangent, pull)
+        basis = self.basis(q)
         pairs = ca.sparsify(ca.kron(self._shape, ca.DM.ones(1, n)) * ca.kron(ca.DM.ones(1, n), self._shape))
         summed = ca.densify(ca.mtimes(ca.reshape(across, 9, n), pairs))
         order = np.arange(9 * n * n).reshape(n, n, 3, 3).transpose(0, 2, 1, 3).ravel()
-        total = ca.mtimes(basis.T, ca.mtimes(self._between_nodes(hessian), basis))
+        total = ca.mtimes(basis.T, ca.mtimes(self.between_nodes(hessian), basis))
         return ca.densify(total + ca.reshape(summed.nz[order.tolist()], 3 * n, 3 * n))
 
     def _large_symbols(self) -> tuple[list[ca.MX], ca.MX, ca.MX, ca.MX, ca.MX, ca.MX]:
@@ -275,11 +275,11 @@ class Element(Term):
         """Derivatives at the points by values at the nodes, (points, nodes)."""
         return ca.DM(interpolation.differentiation(self.nodes, self.points))
 
-    def _at(self, q: ca.MX) -> tuple[ca.MX, ca.MX]:
+    def at(self, q: ca.MX) -> tuple[ca.MX, ca.MX]:
         """Rotations and their derivatives at the points."""
         return (ca.mtimes(q, self._shape.T) if self.gauss else q), ca.mtimes(q, self._derivative.T)
 
-    def _on_nodes(self, gradient: ca.MX) -> ca.MX:
+    def on_nodes(self, gradient: ca.MX) -> ca.MX:
         """Derivatives by the nodes (4, nodes) from those by rotations and slopes at the points (8, points)."""
         return ca.mtimes(gradient[:4, :], self._shape) + ca.mtimes(gradient[4:, :], self._derivative)
 
@@ -288,7 +288,7 @@ class Element(Term):
         n = self.order + 1
         return ca.densify(ca.reshape(ca.mtimes(ca.reshape(change, 12, n), self._shape), 3, 4 * n))
 
-    def _between_nodes(self, hessian: ca.MX) -> ca.MX:
+    def between_nodes(self, hessian: ca.MX) -> ca.MX:
         """The same of second derivatives: (4 nodes, 4 nodes) from (8, 8 points)."""
         n = self.order + 1
         columns = ca.reshape(hessian, 64, n)
@@ -304,7 +304,7 @@ class Element(Term):
         order = entry.transpose(0, 2, 1, 3).ravel()
         return ca.reshape(ca.densify(summed).nz[order.tolist()], 4 * n, 4 * n)
 
-    def _basis(self, q: ca.MX) -> ca.MX:
+    def basis(self, q: ca.MX) -> ca.MX:
         """Derivatives of the quaternions of all nodes by their rotation vectors, (4 nodes, 3 nodes)."""
         one = ca.SX.sym("one", 4)
         columns = [product([0.0, *axis], ca.vertsplit(one)) for axis in np.eye(3).tolist()]
