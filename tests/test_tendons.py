@@ -435,6 +435,40 @@ def test_rigid_member_with_a_tendon_along_it(dimension):
     assert step.tendon("t")["length"] == pytest.approx(1.0 + np.linalg.norm(np.array([-0.5, 0.5]) - hole), abs=1e-9)
 
 
+# -- what hangs on strings alone -----------------------------------------------------------------------
+
+
+@DIMENSIONS
+@pytest.mark.parametrize("stiffness", [50.0, None])
+def test_bar_on_strings(dimension, stiffness):
+    """A bar that nothing but two strings hold: forces and moments of strings and weights are in balance."""
+    points, rest, weights = np.array([[-0.3, 1.0], [1.5, 0.8]]), np.array([[0.0, 0.0], [1.0, 0.0]]), (1.0, 2.0)
+    ways = {"l": [{"ground": [-0.3, 1.0]}, {"node": "B"}], "r": [{"node": "C"}, {"ground": [1.5, 0.8]}]}
+    pull = {"pull": 0.0} if stiffness is None else {"pull": 0.0, "stiffness": stiffness}
+    scene = Scene.from_dict(
+        {
+            "dimension": dimension,
+            "nodes": {"B": {"position": [0, 0, 0]}, "C": {"position": [1, 0, 0]}},
+            "members": {"m": {"nodes": ["B", "C"], "type": "rigid"}},
+            "tendons": {name: {"way": way, **pull} for name, way in ways.items()},
+            "loads": {n: {"type": "force", "node": n, "value": [0, -w]} for n, w in zip("BC", weights, strict=True)},
+        }
+    )
+    step = sfetcas.solve(scene).last
+    ends = np.array([step.position(name)[:2] for name in "BC"])
+    lengths, free = np.linalg.norm(points - ends, axis=1), np.linalg.norm(points - rest, axis=1)
+    tensions = np.array([step.tendon(name)["tension"] for name in "lr"])
+    if stiffness is None:
+        np.testing.assert_allclose(lengths, free, atol=1e-12)
+    else:
+        np.testing.assert_allclose(tensions, stiffness * (lengths - free), atol=1e-10)
+    forces = tensions[:, None] * (points - ends) / lengths[:, None] - np.array([[0.0, w] for w in weights])
+    np.testing.assert_allclose(forces.sum(axis=0), 0.0, atol=1e-10)
+    moments = ends[:, 0] * forces[:, 1] - ends[:, 1] * forces[:, 0]
+    assert moments.sum() == pytest.approx(0.0, abs=1e-10)
+    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(1.0)
+
+
 # -- every analysis ------------------------------------------------------------------------------------
 
 

@@ -573,7 +573,9 @@ def _check_supports(scene: Scene) -> None:
     # equilibrium that it begins with.
     free = scene.analysis.type in ("modes", "dynamic") and scene.analysis.initial == "undeformed"
     if not scene.contacts and not free:
-        check_floating(scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension)
+        check_floating(
+            scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension, scene.tendons
+        )
 
 
 def _check_moving(scene: Scene) -> None:
