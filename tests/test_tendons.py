@@ -643,6 +643,43 @@ def test_exported_code(tmp_path, discs):
     assert re.match(r"(\d+) of \1 cases agree, \1 of them to the last bit", words), words
 
 
+@needs_compiler
+@pytest.mark.parametrize("name", ["pull", "stiffness"])
+def test_exported_pull(tmp_path, name):
+    """Rows that several elements share are in the program in C too."""
+    results = ["nodes.B.position", "tendons.t.tension", "members.m.moment at 0.3"]
+    scene = rod(dimension="plane", **PULLS[name])
+    solver = sfetcas.export(scene, tmp_path / "c", name="c", arguments=["tendons.t.pull"], results=results)
+    outcome, found = solver.solve([PULLS[name]["pull"]])
+    assert outcome.code is Code.SOLVED
+    curvature = T * D / EI
+    np.testing.assert_allclose(found, [*arc(curvature), T, 0.0, 0.0, EI * curvature], atol=1e-5)
+    words = said(built(tmp_path / "c", "c"))
+    assert re.match(r"(\d+) of \1 cases agree, \1 of them to the last bit", words), words
+
+
+def test_control_of_a_servo():
+    """An elastic tendon that a servo shortens turns a bar; the replay by an integrator agrees."""
+    elastic = {"stiffness": 40.0, "pushes": True}
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
+            "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s", "type": "rigid"}},
+            "tendons": {"t": {"way": [{"ground": [0, 0.5]}, {"member": "m", "discs": [0.6]}], "pull": 0.01, **elastic}},
+            "analysis": {"type": "dynamic", "end": 1.0},
+        }
+    )
+    problem = sfetcas.OptimalControl(scene, {"tendons.t.pull": (0.0, 0.5)}, time=1.0, intervals=8)
+    problem.minimise(problem.integral(problem.control("tendons.t.pull") ** 2))
+    problem.subject_to(problem.at_tf(problem.answer("nodes.B.angle")) == 0.3, name="turned")
+    found = problem.solve()
+    assert found.check.difference < 1e-4
+    with pytest.raises(SceneError, match=r"controls.tendons\.t: found a control of a length that has to be followed"):
+        stiff = scene.replace({"tendons.t.stiffness": None, "tendons.t.pull": 0.0})
+        sfetcas.OptimalControl(stiff, {"tendons.t.pull": (0.0, 0.5)}, time=1.0, intervals=8).solve()
+
+
 # -- what is refused -----------------------------------------------------------------------------------
 
 
