@@ -435,6 +435,40 @@ def test_rigid_member_with_a_tendon_along_it(dimension):
     assert step.tendon("t")["length"] == pytest.approx(1.0 + np.linalg.norm(np.array([-0.5, 0.5]) - hole), abs=1e-9)
 
 
+# -- what hangs on strings alone -----------------------------------------------------------------------
+
+
+@DIMENSIONS
+@pytest.mark.parametrize("stiffness", [50.0, None])
+def test_bar_on_strings(dimension, stiffness):
+    """A bar that nothing but two strings hold: forces and moments of strings and weights are in balance."""
+    points, rest, weights = np.array([[-0.3, 1.0], [1.5, 0.8]]), np.array([[0.0, 0.0], [1.0, 0.0]]), (1.0, 2.0)
+    ways = {"l": [{"ground": [-0.3, 1.0]}, {"node": "B"}], "r": [{"node": "C"}, {"ground": [1.5, 0.8]}]}
+    pull = {"pull": 0.0} if stiffness is None else {"pull": 0.0, "stiffness": stiffness}
+    scene = Scene.from_dict(
+        {
+            "dimension": dimension,
+            "nodes": {"B": {"position": [0, 0, 0]}, "C": {"position": [1, 0, 0]}},
+            "members": {"m": {"nodes": ["B", "C"], "type": "rigid"}},
+            "tendons": {name: {"way": way, **pull} for name, way in ways.items()},
+            "loads": {n: {"type": "force", "node": n, "value": [0, -w]} for n, w in zip("BC", weights, strict=True)},
+        }
+    )
+    step = sfetcas.solve(scene).last
+    ends = np.array([step.position(name)[:2] for name in "BC"])
+    lengths, free = np.linalg.norm(points - ends, axis=1), np.linalg.norm(points - rest, axis=1)
+    tensions = np.array([step.tendon(name)["tension"] for name in "lr"])
+    if stiffness is None:
+        np.testing.assert_allclose(lengths, free, atol=1e-12)
+    else:
+        np.testing.assert_allclose(tensions, stiffness * (lengths - free), atol=1e-10)
+    forces = tensions[:, None] * (points - ends) / lengths[:, None] - np.array([[0.0, w] for w in weights])
+    np.testing.assert_allclose(forces.sum(axis=0), 0.0, atol=1e-10)
+    moments = ends[:, 0] * forces[:, 1] - ends[:, 1] * forces[:, 0]
+    assert moments.sum() == pytest.approx(0.0, abs=1e-10)
+    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(1.0)
+
+
 # -- every analysis ------------------------------------------------------------------------------------
 
 
@@ -607,6 +641,43 @@ def test_exported_code(tmp_path, discs):
     np.testing.assert_allclose(results, ROBOT[discs], atol=1e-4)
     words = said(built(tmp_path / "c", "c"))
     assert re.match(r"(\d+) of \1 cases agree, \1 of them to the last bit", words), words
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["pull", "stiffness"])
+def test_exported_pull(tmp_path, name):
+    """Rows that several elements share are in the program in C too."""
+    results = ["nodes.B.position", "tendons.t.tension", "members.m.moment at 0.3"]
+    scene = rod(dimension="plane", **PULLS[name])
+    solver = sfetcas.export(scene, tmp_path / "c", name="c", arguments=["tendons.t.pull"], results=results)
+    outcome, found = solver.solve([PULLS[name]["pull"]])
+    assert outcome.code is Code.SOLVED
+    curvature = T * D / EI
+    np.testing.assert_allclose(found, [*arc(curvature), T, 0.0, 0.0, EI * curvature], atol=1e-5)
+    words = said(built(tmp_path / "c", "c"))
+    assert re.match(r"(\d+) of \1 cases agree, \1 of them to the last bit", words), words
+
+
+def test_control_of_a_servo():
+    """An elastic tendon that a servo shortens turns a bar; the replay by an integrator agrees."""
+    elastic = {"stiffness": 40.0, "pushes": True}
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
+            "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s", "type": "rigid"}},
+            "tendons": {"t": {"way": [{"ground": [0, 0.5]}, {"member": "m", "discs": [0.6]}], "pull": 0.01, **elastic}},
+            "analysis": {"type": "dynamic", "end": 1.0},
+        }
+    )
+    problem = sfetcas.OptimalControl(scene, {"tendons.t.pull": (0.0, 0.5)}, time=1.0, intervals=8)
+    problem.minimise(problem.integral(problem.control("tendons.t.pull") ** 2))
+    problem.subject_to(problem.at_tf(problem.answer("nodes.B.angle")) == 0.3, name="turned")
+    found = problem.solve()
+    assert found.check.difference < 1e-4
+    with pytest.raises(SceneError, match=r"controls.tendons\.t: found a control of a length that has to be followed"):
+        stiff = scene.replace({"tendons.t.stiffness": None, "tendons.t.pull": 0.0})
+        sfetcas.OptimalControl(stiff, {"tendons.t.pull": (0.0, 0.5)}, time=1.0, intervals=8).solve()
 
 
 # -- what is refused -----------------------------------------------------------------------------------

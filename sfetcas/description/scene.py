@@ -432,8 +432,8 @@ def _check_tendons(scene: Scene) -> None:
             section = None if way.member is None else scene.members[way.member].section
             law = None if section is None else scene.sections[section].law
             if law is not None and not way.holes:
-                message = f"found the member {way.member!r}, whose section has the law {law.type!r}, accepted: discs, or"
-                raise SceneError(f"{message} a member without a law", ("tendons", name))
+                found = f"found the member {way.member!r}, whose section has the law {law.type!r}"
+                raise SceneError(f"{found}, accepted: discs, or a member without a law", ("tendons", name))
         if tendon.may_be_slack and (scene.analysis.type != "static" or scene.analysis.equilibria == "all"):
             what = "'all' equilibria" if scene.analysis.type == "static" else f"the analysis {scene.analysis.type!r}"
             message = f"found a length that is given with {what}, in which no tendon becomes slack, accepted: pushes ="
@@ -661,7 +661,9 @@ def _check_supports(scene: Scene) -> None:
     # equilibrium that it begins with.
     free = scene.analysis.type in ("modes", "dynamic") and scene.analysis.initial == "undeformed"
     if not scene.contacts and not free:
-        check_floating(scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension)
+        check_floating(
+            scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension, scene.tendons
+        )
 
 
 def _check_moving(scene: Scene) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from .loads import Motion
 from .records import enumerated, say
 from .springs import Spring
 from .structure import SLIDING, Member, Node, unit
+from .tendons import Tendon
 
 __all__ = [
     "along",
@@ -48,12 +50,18 @@ def fixed_directions(node: Node, displacement: Triple | None = None) -> Floats:
 
 
 def components(
-    nodes: Iterable[str], members: Mapping[str, Member], springs: Mapping[str, Spring]
+    nodes: Iterable[str],
+    members: Mapping[str, Member],
+    springs: Mapping[str, Spring],
+    tendons: Mapping[str, Tendon],
 ) -> Iterator[list[str]]:
-    """Names of the nodes of each part of the structure that members and springs connect."""
+    """Names of the nodes of each part of the structure that members, springs and tendons connect."""
     neighbours: dict[str, list[str]] = {name: [] for name in nodes}
     pairs = [(m.nodes[0], other) for m in members.values() for other in m.nodes[1:]]
-    for first, second in pairs + [(s.node, s.to) for s in springs.values() if s.to is not None]:
+    pairs += [(s.node, s.to) for s in springs.values() if s.to is not None]
+    for tendon in tendons.values():
+        pairs += pairwise(name for name in _passed(tendon, members) if name is not None)
+    for first, second in pairs:
         neighbours[first].append(second)
         neighbours[second].append(first)
     left = dict.fromkeys(neighbours)
@@ -66,6 +74,11 @@ def components(
             for other in new:
                 del left[other]
         yield part
+
+
+def _passed(tendon: Tendon, members: Mapping[str, Member]) -> list[str | None]:
+    """Nodes that a tendon passes, or of the members that it passes the first; None for points of the ground."""
+    return [way.node if way.member is None else members[way.member].nodes[0] for way in tendon.way]
 
 
 def free_directions(fixed: Floats, dimension: str) -> Floats:
@@ -83,6 +96,7 @@ def check_floating(
     springs: Mapping[str, Spring],
     motions: Mapping[str, Motion],
     dimension: str,
+    tendons: Mapping[str, Tendon],
 ) -> None:
     """Refuse a part of the structure that supports do not hold in every direction.
 
@@ -97,7 +111,13 @@ def check_floating(
         if spring.type == "translational" and spring.to is None and spring.stiffness > 0.0:
             along = spring.direction
             sprung[spring.node].append(np.eye(3) if along is None else np.array([unit(along)]))
-    for part in components(nodes, members, springs):
+    for tendon in tendons.values():
+        # As springs to the ground: whether what pulls also holds is found with the loads.
+        for one, other in pairwise(_passed(tendon, members)):
+            held = one if other is None else other if one is None else None
+            if held is not None:
+                sprung[held].append(np.eye(3))
+    for part in components(nodes, members, springs, tendons):
         fixed = np.vstack([fixed_directions(nodes[name], moved.get(name)) for name in part])
         fixed = np.vstack([fixed, *(rows for name in part for rows in sprung[name])])
         free = free_directions(fixed, dimension)

@@ -305,7 +305,9 @@ class ModalAnalysis:
         everywhere = scene.gravity is not None or scene.rotating is not None
         if not any(scene.driven) and not everywhere and not sprung:
             return None
-        check_floating(scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension)
+        check_floating(
+            scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension, scene.tendons
+        )
         found = statics.solve(scene, self.settings)
         self.seconds = dict(found.seconds)
         return found.last

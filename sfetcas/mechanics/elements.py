@@ -234,7 +234,7 @@ class Element(Term):
             return super().rotation_gradient()
         symbols, q, point, load = self._large_symbols()
         strain, tangents, gradient, hessian, *change = self._point.map(self.order + 1)(*point)
-        by_q, basis, gained = self._on_nodes(gradient), self._basis(q), tangents - self._tangent_of(point)
+        by_q, basis, gained = self.on_nodes(gradient), self.basis(q), tangents - self._tangent_of(point)
         matrix = ca.mtimes(basis.T, ca.mtimes(self._between_sides(hessian), basis))
         # What keeps quaternions on the unit sphere.
         radial = ca.vec(ca.repmat(ca.sum1(q * by_q), 3, 1))
@@ -255,7 +255,7 @@ class Element(Term):
             return super().rotation_forces()
         symbols, q, point, _ = self._large_symbols()
         tangents, gradient, *_ = self._of_point("gradient").map(self.order + 1)(*point)
-        moments = ca.mtimes(self._basis(q).T, self._on_sides(gradient))
+        moments = ca.mtimes(self.basis(q).T, self._on_sides(gradient))
         results = {"rows": ca.sum2(tangents - self._tangent_of(point)), "gradient": ca.densify(moments)}
         return self._function("forces", symbols, results)
 
@@ -310,12 +310,12 @@ class Element(Term):
 
     def _convex_in_space(self, q: ca.MX, stiffness: ca.MX, tangent: ca.MX, pull: ca.MX) -> ca.MX:
         n = self.order + 1
-        hessian, across = self._convex_point.map(n)(*self._at(q), stiffness, tangent, pull)
-        basis = self._basis(q)[: 4 * n, : 3 * n]
+        hessian, across = self._convex_point.map(n)(*self.at(q), stiffness, tangent, pull)
+        basis = self.basis(q)[: 4 * n, : 3 * n]
         pairs = ca.sparsify(ca.kron(self._shape, ca.DM.ones(1, n)) * ca.kron(ca.DM.ones(1, n), self._shape))
         summed = ca.densify(ca.mtimes(ca.reshape(across, 9, n), pairs))
         order = np.arange(9 * n * n).reshape(n, n, 3, 3).transpose(0, 2, 1, 3).ravel()
-        total = ca.mtimes(basis.T, ca.mtimes(self._between_nodes(hessian), basis))
+        total = ca.mtimes(basis.T, ca.mtimes(self.between_nodes(hessian), basis))
         return ca.densify(total + ca.reshape(summed.nz[order.tolist()], 3 * n, 3 * n))
 
     def _large_symbols(self) -> tuple[list[ca.MX], ca.MX, list[ca.MX], ca.MX]:
@@ -330,7 +330,7 @@ class Element(Term):
         given = ca.reshape(symbols[3], self.axes, turns)
         stiffness, tangent, compliance = self.split(symbols[2])
         strains, compliances = ([symbols[1]], [compliance]) if self.strains else ([], [])
-        at = self._at(symbols[0]) if self.space else ()
+        at = self.at(symbols[0]) if self.space else ()
         point = [*at, *strains, stiffness, tangent, *compliances, given + ca.repmat(symbols[4], 1, turns)]
         return symbols, symbols[0], point, given
 
@@ -352,17 +352,17 @@ class Element(Term):
         """Derivatives at the points by values at the nodes, (points, nodes)."""
         return ca.DM(interpolation.differentiation(self.nodes, self.points))
 
-    def _at(self, q: ca.MX) -> tuple[ca.MX, ca.MX]:
+    def at(self, q: ca.MX) -> tuple[ca.MX, ca.MX]:
         """Rotations and their derivatives at the points."""
         return (ca.mtimes(q, self._shape.T) if self.gauss else q), ca.mtimes(q, self._derivative.T)
 
-    def _on_nodes(self, gradient: ca.MX) -> ca.MX:
+    def on_nodes(self, gradient: ca.MX) -> ca.MX:
         """Derivatives by the nodes (4, nodes) from those by rotations and slopes at the points (8, points)."""
         return ca.mtimes(gradient[:4, :], self._shape) + ca.mtimes(gradient[4:8, :], self._derivative)
 
     def _on_sides(self, gradient: ca.MX) -> ca.MX:
         """Derivatives by the components of the nodes, then by the strains, from those at the points."""
-        return ca.vertcat(ca.vec(self._on_nodes(gradient)), ca.vec(gradient[8:, :]))
+        return ca.vertcat(ca.vec(self.on_nodes(gradient)), ca.vec(gradient[8:, :]))
 
     def _by_sides(self, change: list[ca.MX]) -> ca.MX:
         """Derivative of the chord by the components of the nodes (3, 4 nodes), then by the strains (3, 3 points).
@@ -377,13 +377,13 @@ class Element(Term):
         """Second derivatives by the components of the nodes, then by the strains, from those of the points."""
         n, size = self.order + 1, 11
         if not self.strains:
-            return self._between_nodes(hessian)
+            return self.between_nodes(hessian)
         entries = np.arange(size**2 * n).reshape(n, size, size)
         picked = [
             ca.reshape(hessian.nz[entries[:, columns, rows].ravel().tolist()], -1, n)
             for columns, rows in ((slice(0, 8), slice(0, 8)), (slice(8, 11), slice(0, 4)), (slice(8, 11), slice(4, 8)))
         ]
-        nodes = self._between_nodes(ca.reshape(picked[0], 8, 8 * n))
+        nodes = self.between_nodes(ca.reshape(picked[0], 8, 8 * n))
         # Of a node and the strains of a point: entries (4, 3), those of all nodes beside each other for each point.
         across = []
         for k in range(n):
@@ -396,7 +396,7 @@ class Element(Term):
         """Second derivatives by the strains of the points, block by block."""
         return ca.diagcat(*[part[8:, 8:] for part in ca.horzsplit(hessian, 11)])
 
-    def _between_nodes(self, hessian: ca.MX) -> ca.MX:
+    def between_nodes(self, hessian: ca.MX) -> ca.MX:
         """The same of second derivatives: (4 nodes, 4 nodes) from (8, 8 points)."""
         n = self.order + 1
         columns = ca.reshape(hessian, 64, n)
@@ -412,7 +412,7 @@ class Element(Term):
         order = entry.transpose(0, 2, 1, 3).ravel()
         return ca.reshape(ca.densify(summed).nz[order.tolist()], 4 * n, 4 * n)
 
-    def _basis(self, q: ca.MX) -> ca.MX:
+    def basis(self, q: ca.MX) -> ca.MX:
         """Derivatives of the quaternions of all nodes by their rotation vectors, (4 nodes, 3 nodes)."""
         one = ca.SX.sym("one", 4)
         columns = [product([0.0, *axis], ca.vertsplit(one)) for axis in np.eye(3).tolist()]

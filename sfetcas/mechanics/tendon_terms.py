@@ -17,6 +17,7 @@ Source: Rao, Peyron, Lilge and Burgner-Kahrs, Frontiers in Robotics and AI 7, 63
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, final
@@ -29,7 +30,7 @@ from ..mathematics.arrays import Array, numbers
 from .elements import Element
 from .parts import Parts
 from .segments import elongation_of
-from .terms import GROUND, One, Side, Term
+from .terms import ARGUMENTS, GROUND, One, Side, Term, name_of
 
 __all__ = ["Elongation", "Routed", "Strung", "tendons_in"]
 
@@ -105,6 +106,64 @@ class Routed(_Part):
             way = self.element.strained(forward[:, k], compliance[:, k], ca.vertcat(*u[k])) if u else forward[:, k]
             total += ca.norm_2(way + turned)
         return total
+
+    # In space as of elements: derivatives of one point, mapped over the points and put together by constant matrices.
+
+    def rotation_gradient(self) -> ca.Function:
+        """As :meth:`.Term.rotation_gradient`; in space assembled from the derivatives of single points."""
+        if not self.space or self.element.strains:
+            return super().rotation_gradient()
+        symbols, q, forward, arm, rest = self._large_symbols()
+        _, _, _, load, lam = symbols
+        length, gradient, hessian = self._point.map(self.element.order + 1)(*self.element.at(q), forward, arm)
+        by_q, basis, change = self.element.on_nodes(gradient), self.element.basis(q), ca.sum2(length) - rest
+        matrix = ca.mtimes(basis.T, ca.mtimes(self.element.between_nodes(hessian), basis))
+        # What keeps quaternions on the unit sphere.
+        matrix -= 0.25 * ca.diag(ca.vec(ca.repmat(ca.sum1(q * by_q), 3, 1)))
+        slope = ca.mtimes(basis.T, ca.vec(by_q))
+        tension = lam if self.given else load
+        results = {
+            "energy": ca.MX.zeros(1) if self.given else load * change,
+            "stored": ca.MX.zeros(1),
+            "rows": change + load if self.given else ca.MX(0, 1),
+            "gradient": ca.densify(tension * slope),
+            "stiffness": ca.densify(tension * matrix),
+            "rotation_jacobian": ca.densify(slope.T) if self.given else ca.MX(0, slope.shape[0]),
+        }
+        name = f"rotation_gradient_{name_of(self)}"
+        return ca.Function(name, symbols, list(results.values()), [*ARGUMENTS], list(results))
+
+    def curvatures(self) -> ca.Function:
+        """As :meth:`.Term.curvatures`; in space assembled from the derivatives of single points."""
+        if not self.space or self.element.strains:
+            return super().curvatures()
+        symbols, q, forward, arm, _ = self._large_symbols()
+        weight = ca.MX.sym("weight")
+        _, _, hessian = self._point.map(self.element.order + 1)(*self.element.at(q), forward, arm)
+        tension = symbols[4] if self.given else weight * symbols[3]
+        found = ca.densify(tension * self.element.between_nodes(hessian))
+        name = f"curvatures_{name_of(self)}"
+        return ca.Function(name, [*symbols, weight], [found], [*ARGUMENTS, "weight"], ["hessian"])
+
+    def _large_symbols(self) -> tuple[list[ca.MX], ca.MX, ca.MX, ca.MX, ca.MX]:
+        """Arguments of functions put together of others; of these rotations, derivatives of places, arms, and length at
+        rest.
+        """
+        turns, places, rows, count, load = self.sizes
+        shapes = ((4, turns), (3, places), (count, 1), (load, 1), (rows, 1))
+        symbols = [ca.MX.sym(name, *shape) for name, shape in zip(ARGUMENTS, shapes, strict=True)]
+        forward, arm, rest, _ = ca.vertsplit(symbols[2], [0, 3 * turns, 6 * turns, 6 * turns + 1, count])
+        return symbols, symbols[0], ca.reshape(forward, 3, turns), ca.reshape(arm, 3, turns), rest
+
+    @functools.cached_property
+    def _point(self) -> ca.Function:
+        """(rotation, slope, derivative of the place, arm) of one point -> length, gradient (8,) and Hessian (8, 8)."""
+        names = {"here": 4, "slope": 4, "forward": 3, "arm": 3}
+        here, slope, forward, arm = symbols = [ca.SX.sym(name, size) for name, size in names.items()]
+        length = ca.norm_2(forward + ca.cross(self.element.curvature(here, slope), arm))
+        hessian, gradient = ca.hessian(length, ca.vertcat(here, slope))
+        results = [ca.densify(one) for one in (length, gradient, hessian)]
+        return ca.Function(f"point_{name_of(self)}", symbols, results, {"cse": True})
 
 
 @final
