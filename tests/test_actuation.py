@@ -161,14 +161,16 @@ def test_strip_that_curls_into_the_floor_is_pressed_there_by_its_end():
     assert found.contacts["floor"]["force"][1] == pytest.approx(1.5 * 2.0 * 0.05, rel=1e-4)
 
 
-def test_heavy_strip_that_curls_off_the_floor_lies_as_one_that_was_made_so():
+@BOTH
+def test_heavy_strip_that_curls_off_the_floor_lies_as_one_that_was_made_so(dimension):
     more = {"contacts": FLOOR, "gravity": [0, -9.81]}
-    one = sfetcas.solve(actuated(0.8, more=more), accuracy=1e-6).last
+    one = sfetcas.solve(actuated(0.8, dimension=dimension, more=more), accuracy=1e-6).last
     place, _ = screwed([0, 0, 0.8])
     nodes = {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": place.tolist()}}
     shape = {"type": "curvature", "length": 1.0, "start": [1, 0, 0], "kappa3": [0.8]}
     members = {"m": {"nodes": ["A", "B"], "section": "s", "shape": shape}}
-    other = sfetcas.solve(strip(nodes=nodes, members=members, **more), accuracy=1e-6).last
+    made = strip(nodes=nodes, members=members, dimension=dimension, **more)
+    other = sfetcas.solve(made, accuracy=1e-6).last
     assert one.contacts["floor"]["at"][1] > 0.2
     np.testing.assert_allclose(one.contacts["floor"]["at"], other.contacts["floor"]["at"], atol=1e-5)
     x = np.array([0.0, 0.1, 0.5, 0.9])

@@ -200,6 +200,30 @@ def test_forces_and_reactions_are_arrows_with_their_amounts():
     assert {"load", "reaction", "undeformed"} <= set(texts(figure))
 
 
+def test_magnets_fields_and_natural_curvature_are_drawn():
+    """Arrows of magnets turn with them, those of the field do not; curvature is drawn on the side it bends to."""
+    tables = {
+        "fields": {"up": {"value": [0, 0.5]}},
+        "magnets": {"end": {"node": "B", "moment": [2.0, 0]}},
+        "actuations": {"k": {"member": "m", "value": 0.8, "span": [0.2, 0.6]}},
+    }
+    solution = beam(loads={}, **tables)
+    figure = picture(solution)
+    (magnet,), (field,) = arrows(figure, "magnet-end"), arrows(figure, "field-up")
+    angle = solution.last.angle("B")
+    along = (magnet[1] - magnet[0]) / np.linalg.norm(magnet[1] - magnet[0])
+    np.testing.assert_allclose(along, [np.cos(angle), np.sin(angle)], atol=1e-9)
+    np.testing.assert_allclose(magnet.mean(axis=0), solution.last.position("B")[:2], atol=1e-9)
+    assert abs(field[1] - field[0])[0] < 1e-9 < (field[1] - field[0])[1]
+    assert texts(figure, "field-up") == ["0.5 T"]
+    assert texts(figure, "actuation-k") == ["0.8 1/m"]
+    (line,) = named(figure, "actuation-k", Line2D)
+    places = solution.last.along("m", np.linspace(0.2, 0.6, 33))["position"][:, :2]
+    # Bent to the left: above it.
+    assert ((line.get_xydata() - places)[:, 1] > 0.0).all()
+    assert {"magnetic field", "natural curvature"} <= set(texts(figure))
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 def test_moments_turn_the_right_way(sign):
     solution = beam((0, 0), loads={"turn": {"type": "moment", "node": "B", "value": 0.7 * sign}})
