@@ -15,9 +15,12 @@ from test_codegen import built, needs_compiler, said
 
 import sfetcas
 from sfetcas import CrossSection, Scene, SceneError
+from sfetcas.mathematics.forms import Form
 from sfetcas.mathematics.potentials import derivatives_of
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
+from sfetcas.mechanics.laws import AlongElement
+from sfetcas.mechanics.terms import Term
 from sfetcas.solvers.globalised import Code
 
 BILINEAR = {"type": "bilinear", "moment": 1.0, "ratio": 0.2}
@@ -229,6 +232,27 @@ def test_moments_are_slopes_of_the_potential():
     assert miss[0] / miss[1] > 5.0
     assert miss[1] / miss[2] > 5.0
     assert miss[2] < 1e-3
+
+
+@pytest.mark.parametrize("gauss", [False, True], ids=["nodes", "gauss"])
+def test_derivatives_of_points_are_those_of_the_whole(gauss):
+    """In space the functions put together of points are those of the expression of the whole element."""
+    rng = np.random.default_rng(3)
+    kind = AlongElement(True, 3, gauss, 0, Form("ramberg_osgood", 0))
+    q = rng.normal(size=(4, 3)) * 0.2 + [[1.0], [0], [0], [0]]
+    data = rng.uniform(0.5, 2.0, kind.sizes[3])
+    given = [q / np.linalg.norm(q, axis=0), np.zeros((3, 0)), data, np.zeros(0), np.zeros(0)]
+    for name, count, more in (
+        ("rotation_gradient", 5, []),
+        ("rotation_forces", 5, []),
+        ("slopes", 4, []),
+        ("curvatures", 5, [0.7]),
+    ):
+        arguments = [*given[:count], *more]
+        ours, theirs = (getattr(owner, name)(kind).call(arguments) for owner in (AlongElement, Term))
+        for one, other in zip(ours, theirs, strict=True):
+            # Rounding of sums of numbers of size one to ten.
+            np.testing.assert_allclose(one.full(), other.full(), atol=1e-12)
 
 
 def test_both_axes_of_a_round_section():

@@ -30,6 +30,7 @@ Source: Barraco and Munteanu, Part 1, sections 3 and 4 (SFET2, SFET3); the highe
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, final
 
@@ -341,6 +342,62 @@ class Element(Term):
     def _function(self, name: str, arguments: list[ca.MX], results: dict[str, ca.MX]) -> ca.Function:
         names = [*ARGUMENTS, "weight"][: len(arguments)]
         return ca.Function(f"{name}_{name_of(self)}", arguments, list(results.values()), names, list(results))
+
+    def point_energy(self, name: str, energy: Callable[[ca.SX, ca.SX], ca.SX], width: int, wanted: str) -> ca.Function:
+        """The energy of one point in space from the change of the curvature there, with its derivatives.
+
+        Parameters
+        ----------
+        name : str
+            Of the function.
+        energy : callable
+            (change of the curvature times length (3,), fixed axes of the undeformed scene; data (width,)) -> energy.
+        wanted : str
+            ``gradient``, ``hessian`` or ``both``; the other one is empty.
+
+        Returns
+        -------
+        Function
+            ``(rotation, slope, data) ->`` energy, gradient (8,) and second derivatives (8, 8) by rotation and slope.
+        """
+        here, slope, data = ca.SX.sym("here", 4), ca.SX.sym("slope", 4), ca.SX.sym("data", width)
+        value = energy(self._curvature(here, slope), data)
+        hessian, gradient = ca.hessian(value, ca.vertcat(here, slope))
+        results = [
+            value,
+            ca.SX(0, 1) if wanted == "hessian" else gradient,
+            ca.SX(0, 0) if wanted == "gradient" else hessian,
+        ]
+        return ca.Function(name, [here, slope, data], [ca.densify(part) for part in results], {"cse": True})
+
+    def summed(self, function: ca.Function, q: ca.MX, data: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """Sum over the points of a function as of :meth:`point_energy`, with its derivatives by the nodes.
+
+        Parameters
+        ----------
+        function : Function
+        q : (4, p + 1), rotations of the nodes
+        data : (m, p + 1), a column for each point
+
+        Returns
+        -------
+        energy, its gradient (4, p + 1) and its second derivatives (4 (p + 1), 4 (p + 1)) by the rotations of the nodes
+        """
+        energies, gradient, hessian = function.map(self.order + 1)(*self._at(q), data)
+        by_nodes = self._on_nodes(gradient) if gradient.numel() else ca.MX(4, 0)
+        return ca.sum2(energies), by_nodes, self._between_nodes(hessian) if hessian.numel() else ca.MX(0, 0)
+
+    def by_rotation_vectors(self, q: ca.MX, gradient: ca.MX, hessian: ca.MX | None) -> tuple[ca.MX, ca.MX]:
+        """Derivatives as of :meth:`summed` by rotation vectors about the fixed axes: (3 (p + 1),), and that squared.
+
+        Of unit quaternions, as :func:`~sfetcas.mechanics.terms.rotation_gradient` says; no second ones for None.
+        """
+        basis = self._basis(q)
+        moments = ca.densify(ca.mtimes(basis.T, ca.vec(gradient)))
+        if hessian is None:
+            return moments, ca.MX(0, 0)
+        radial = ca.diag(ca.vec(ca.repmat(ca.sum1(q * gradient), 3, 1)))
+        return moments, ca.densify(ca.mtimes(basis.T, ca.mtimes(hessian, basis)) - 0.25 * radial)
 
     @functools.cached_property
     def _shape(self) -> ca.DM:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
 
 import casadi as ca
 import numpy as np
@@ -25,9 +25,9 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers
 from ..mathematics.forms import Form
 from ..mathematics.potentials import derivatives_of, deviation
-from .elements import element_by_name
+from .elements import Element, element_by_name
 from .parts import Parts
-from .terms import One, Side, Term, name_of
+from .terms import ARGUMENTS, One, Side, Term, name_of
 
 __all__ = ["AlongElement", "curvature_by_moment", "law_of", "laws_in", "least_stiffness"]
 
@@ -91,8 +91,60 @@ class AlongElement(Term):
         own = point[self.width - self.form.size :]
         return point[0] * deviation(self.form, self.bending(bent, point), own)
 
+    # -- derivatives: in space those of one point, mapped over the points, as of the element -------------
+
+    def rotation_gradient(self) -> ca.Function:
+        """As :meth:`.Term.rotation_gradient`; in space assembled from the derivatives of single points."""
+        if not self.space:
+            return super().rotation_gradient()
+        symbols, q, points = self._large_symbols(5)
+        energy, by_nodes, hessian = self._element.summed(self._point("both"), q, points)
+        gradient, stiffness = self._element.by_rotation_vectors(q, by_nodes, hessian)
+        nothing = ca.MX(0, 1), ca.MX(0, 3 * self.nodes)
+        results = [energy, energy, nothing[0], gradient, stiffness, nothing[1]]
+        names = ["energy", "stored", "rows", "gradient", "stiffness", "rotation_jacobian"]
+        return ca.Function(f"rotation_gradient_{name_of(self)}", symbols, results, [*ARGUMENTS], names)
+
+    def rotation_forces(self) -> ca.Function:
+        """As :meth:`.Term.rotation_forces`; in space assembled from the derivatives of single points."""
+        if not self.space:
+            return super().rotation_forces()
+        symbols, q, points = self._large_symbols(5)
+        by_nodes = self._element.summed(self._point("gradient"), q, points)[1]
+        gradient = self._element.by_rotation_vectors(q, by_nodes, None)[0]
+        results = [ca.MX(0, 1), gradient]
+        return ca.Function(f"forces_{name_of(self)}", symbols, results, [*ARGUMENTS], ["rows", "gradient"])
+
+    def slopes(self) -> ca.Function:
+        """As :meth:`.Term.slopes`; in space assembled from the derivatives of single points."""
+        if not self.space:
+            return super().slopes()
+        symbols, q, points = self._large_symbols(4)
+        by_nodes = self._element.summed(self._point("gradient"), q, points)[1]
+        results = [ca.densify(ca.vec(by_nodes)), ca.MX(0, 4 * self.nodes)]
+        return ca.Function(f"slopes_{name_of(self)}", symbols, results, [*ARGUMENTS[:4]], ["gradient", "jacobian"])
+
+    def curvatures(self) -> ca.Function:
+        """As :meth:`.Term.curvatures`; in space assembled from the derivatives of single points."""
+        if not self.space:
+            return super().curvatures()
+        symbols, q, points = self._large_symbols(5)
+        weight = ca.MX.sym("weight")
+        hessian = weight * self._element.summed(self._point("hessian"), q, points)[2]
+        given = [*ARGUMENTS, "weight"]
+        return ca.Function(f"curvatures_{name_of(self)}", [*symbols, weight], [hessian], given, ["hessian"])
+
+    def _large_symbols(self, count: int) -> tuple[list[ca.MX], ca.MX, ca.MX]:
+        """The first arguments of functions put together of others, the rotations, and data of the points."""
+        sizes = {"q": (4, self.nodes), "u": (3, 0), "data": (self.sizes[3], 1), "load": (0, 1), "lam": (0, 1)}
+        symbols = [ca.MX.sym(name, *size) for name, size in sizes.items()]
+        return symbols[:count], symbols[0], ca.reshape(symbols[2], self.width, self.nodes)
+
+    def _point(self, wanted: str) -> ca.Function:
+        return self._element.point_energy(f"point_{name_of(self)}_{wanted}", self._at, self.width, wanted)
+
     @property
-    def _element(self) -> Any:
+    def _element(self) -> Element:
         return element_by_name(f"SFET{self.nodes}", self.space, self.gauss)
 
     @functools.cached_property
