@@ -675,9 +675,36 @@ def test_control_of_a_servo():
     problem.subject_to(problem.at_tf(problem.answer("nodes.B.angle")) == 0.3, name="turned")
     found = problem.solve()
     assert found.check.difference < 1e-4
+    stiff = scene.replace({"tendons.t.stiffness": None, "tendons.t.pull": 0.0})
     with pytest.raises(SceneError, match=r"controls.tendons\.t: found a control of a length that has to be followed"):
-        stiff = scene.replace({"tendons.t.stiffness": None, "tendons.t.pull": 0.0})
         sfetcas.OptimalControl(stiff, {"tendons.t.pull": (0.0, 0.5)}, time=1.0, intervals=8).solve()
+
+
+# -- pictures ------------------------------------------------------------------------------------------
+
+
+def test_picture():
+    """A tendon is drawn where it is: along the deformed member, and from hole to hole; a slack one is thinner."""
+    pytest.importorskip("matplotlib").use("Agg")
+    from test_plotting import drawn, named
+
+    tendons = {
+        "along": {"way": [{"member": "m", "offset": D}], "tension": T},
+        "holes": {"way": [{"ground": [0, -0.2]}, {"member": "m", "offset": -D, "discs": [0.5, 1.0]}], "pull": -0.1},
+    }
+    step = sfetcas.solve(rod(tendons=tendons)).last
+    figure = step.plot()
+    (along,) = drawn(figure, "tendon-along")
+    radius = EI / T / D - D
+    # A circle about the same centre; the mesh is that of the default accuracy.
+    np.testing.assert_allclose(np.hypot(along[:, 0], along[:, 1] - EI / T / D), radius, atol=1e-4)
+    first, last = drawn(figure, "tendon-holes")
+    angle = T * D / EI
+    hole = arc(angle)[:2] + D * np.array([np.sin(angle), -np.cos(angle)])
+    np.testing.assert_allclose(last[-1], hole, atol=1e-4)
+    np.testing.assert_allclose(first[0], [0.0, -0.2], atol=1e-12)
+    thin, thick = (named(figure, f"tendon-{name}")[0].get_linewidth() for name in ("holes", "along"))
+    assert thin < thick
 
 
 # -- what is refused -----------------------------------------------------------------------------------
