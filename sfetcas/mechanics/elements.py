@@ -235,7 +235,7 @@ class Element(Term):
             return super().rotation_gradient()
         symbols, q, point, load = self._large_symbols()
         strain, tangents, gradient, hessian, *change = self._point.map(self.order + 1)(*point)
-        by_q, basis, gained = self.on_nodes(gradient), self.basis(q), tangents - self._tangent_of(point)
+        by_q, basis, gained = self.on_nodes(gradient), self._basis(q), tangents - self._tangent_of(point)
         matrix = ca.mtimes(basis.T, ca.mtimes(self._between_sides(hessian), basis))
         # What keeps quaternions on the unit sphere.
         radial = ca.vec(ca.repmat(ca.sum1(q * by_q), 3, 1))
@@ -256,7 +256,7 @@ class Element(Term):
             return super().rotation_forces()
         symbols, q, point, _ = self._large_symbols()
         tangents, gradient, *_ = self._of_point("gradient").map(self.order + 1)(*point)
-        moments = ca.mtimes(self.basis(q).T, self._on_sides(gradient))
+        moments = ca.mtimes(self._basis(q).T, self._on_sides(gradient))
         results = {"rows": ca.sum2(tangents - self._tangent_of(point)), "gradient": ca.densify(moments)}
         return self._function("forces", symbols, results)
 
@@ -312,7 +312,7 @@ class Element(Term):
     def _convex_in_space(self, q: ca.MX, stiffness: ca.MX, tangent: ca.MX, pull: ca.MX) -> ca.MX:
         n = self.order + 1
         hessian, across = self._convex_point.map(n)(*self.at(q), stiffness, tangent, pull)
-        basis = self.basis(q)[: 4 * n, : 3 * n]
+        basis = self.basis(q)
         pairs = ca.sparsify(ca.kron(self._shape, ca.DM.ones(1, n)) * ca.kron(ca.DM.ones(1, n), self._shape))
         summed = ca.densify(ca.mtimes(ca.reshape(across, 9, n), pairs))
         order = np.arange(9 * n * n).reshape(n, n, 3, 3).transpose(0, 2, 1, 3).ravel()
@@ -361,7 +361,7 @@ class Element(Term):
             ``(rotation, slope, data) ->`` energy, gradient (8,) and second derivatives (8, 8) by rotation and slope.
         """
         here, slope, data = ca.SX.sym("here", 4), ca.SX.sym("slope", 4), ca.SX.sym("data", width)
-        value = energy(self._curvature(here, slope), data)
+        value = energy(self.curvature(here, slope), data)
         hessian, gradient = ca.hessian(value, ca.vertcat(here, slope))
         results = [
             value,
@@ -383,16 +383,16 @@ class Element(Term):
         -------
         energy, its gradient (4, p + 1) and its second derivatives (4 (p + 1), 4 (p + 1)) by the rotations of the nodes
         """
-        energies, gradient, hessian = function.map(self.order + 1)(*self._at(q), data)
-        by_nodes = self._on_nodes(gradient) if gradient.numel() else ca.MX(4, 0)
-        return ca.sum2(energies), by_nodes, self._between_nodes(hessian) if hessian.numel() else ca.MX(0, 0)
+        energies, gradient, hessian = function.map(self.order + 1)(*self.at(q), data)
+        by_nodes = self.on_nodes(gradient) if gradient.numel() else ca.MX(4, 0)
+        return ca.sum2(energies), by_nodes, self.between_nodes(hessian) if hessian.numel() else ca.MX(0, 0)
 
     def by_rotation_vectors(self, q: ca.MX, gradient: ca.MX, hessian: ca.MX | None) -> tuple[ca.MX, ca.MX]:
         """Derivatives as of :meth:`summed` by rotation vectors about the fixed axes: (3 (p + 1),), and that squared.
 
         Of unit quaternions, as :func:`~sfetcas.mechanics.terms.rotation_gradient` says; no second ones for None.
         """
-        basis = self._basis(q)
+        basis = self.basis(q)
         moments = ca.densify(ca.mtimes(basis.T, ca.vec(gradient)))
         if hessian is None:
             return moments, ca.MX(0, 0)
@@ -477,7 +477,11 @@ class Element(Term):
             "basis", [one], [ca.densify(0.5 * ca.horzcat(*[ca.vertcat(*column) for column in columns]))]
         )
         blocks = block.map(self.order + 1)(q)
-        return ca.diagcat(*ca.horzsplit(blocks, 3), ca.MX.eye(self.axes * self.sizes[1]))
+        return ca.diagcat(*ca.horzsplit(blocks, 3))
+
+    def _basis(self, q: ca.MX) -> ca.MX:
+        """The same with the strains of the points, which are their own."""
+        return ca.diagcat(self.basis(q), ca.MX.eye(self.axes * self.sizes[1]))
 
     def _of_point(self, what: str) -> ca.Function:
         """Arguments of a point (see :meth:`_point_symbols`) -> gradient, or Hessian with the energy times a weight.
