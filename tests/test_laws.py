@@ -41,6 +41,12 @@ def given(law):
     return {"law": law} | {k: v for k, v in LINEAR.items() if law["type"] != "table" or k not in own}
 
 
+PCHIPS = (
+    PchipInterpolator(UNEQUAL["curvature"], UNEQUAL["moment"]),
+    PchipInterpolator([-x for x in KNOTS[:0:-1]] + KNOTS, [-x for x in MOMENTS[:0:-1]] + MOMENTS),
+)
+
+
 def moment_of(law, k):
     """The moments of the laws above by other formulas, at curvatures of both signs."""
     a = abs(k)
@@ -50,10 +56,7 @@ def moment_of(law, k):
         return np.sign(k) * brentq(lambda m: m + 0.3 * m**4 - a, 0.0, a + 1.0, xtol=1e-14)
     if law is QUARTIC:
         return k + 0.4 * k**3
-    if law is TABLE:
-        both = [-x for x in KNOTS[:0:-1]] + KNOTS, [-x for x in MOMENTS[:0:-1]] + MOMENTS
-        return float(PchipInterpolator(*both)(k))
-    return float(PchipInterpolator(law["curvature"], law["moment"])(k))
+    return float(PCHIPS[law["moment"][0] == 0.0](k))
 
 
 def curvature_of(law, m):
@@ -62,6 +65,8 @@ def curvature_of(law, m):
         return np.sign(m) * (min(a, 1.0) + max(a - 1.0, 0.0) / 0.2)
     if law is RAMBERG:
         return np.sign(m) * (a + 0.3 * a**4)
+    if law["type"] == "table" and law["moment"] in (MOMENTS, UNEQUAL["moment"]):
+        return float(PCHIPS[law is TABLE].solve(m, extrapolate=False)[0]) if m else 0.0
     return brentq(lambda k: moment_of(law, k) - m, -7.99, 7.99, xtol=1e-14) if m else 0.0
 
 

@@ -134,7 +134,7 @@ members.NAME.angle at | rad | | all | the same in the plane, counting turns
 members.NAME.force at | N | x y z | statics, motion, parameters | section force: of what is beyond on what is before
 members.NAME.moment at | N m | x y z | statics, motion, parameters | section moment, likewise
 members.NAME.curvature at | 1/m | b1 b2 b3 | statics, motion, parameters | whole curvature about b1 (twist), b2, b3
-members.NAME.bending_strain at | | | statics, motion, parameters | largest in the section, where that has a shape
+members.NAME.bending_strain at | | | statics, motion, parameters | largest, where the section has a shape and no law
 members.NAME.bending_stress at | Pa | | statics, motion, parameters | E times that strain
 members.NAME.velocity at | m/s | x y z | motion | of the centre line; not of small members
 members.NAME.angular_velocity at | rad/s | x y z | motion | of the sections; not of small members
