@@ -270,6 +270,27 @@ def test_both_axes_of_a_round_section():
         np.testing.assert_allclose(found, [plane[0], plane[1] * np.cos(angle), plane[1] * np.sin(angle)], atol=2e-8)
 
 
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+@pytest.mark.parametrize(("b2", "sign"), [([0, 0, 1], 1.0), ([0, 0, -1], -1.0)])
+def test_other_axis(b2, sign, dimension):
+    """A law about b2, which is along z or against it: of unequal signs the other one is met."""
+    section = {"EI3": 1.0, "GJ": 1.0, "law": {**UNEQUAL, "about": "b2"}}
+    one = scene(UNEQUAL, section=section, dimension=dimension).replace({"members.beam.b2": b2})
+    k = sign * curvature_of(UNEQUAL, sign * 1.5)
+    found = sfetcas.solve(one).last
+    np.testing.assert_allclose(found.position("B")[:2], arc(k), atol=1e-8)
+    curvature = found.fields.along("beam", np.array([0.5]))["curvature"][0]
+    np.testing.assert_allclose(curvature, [0.0, sign * k, 0.0], atol=1e-8)
+
+
+def test_ribbon_by_ipopt():
+    one = scene(section=RIBBON, load=force([0.0, 0.004, -0.03]), dimension="space").replace(
+        {"nodes.B.position": [0.1, 0, 0], "members.beam.b2": [0, 0, 1]}
+    )
+    found = [sfetcas.solve(one, solver=solver, accuracy=1e-6).last.position("B") for solver in ("newton", "ipopt")]
+    np.testing.assert_allclose(*found, atol=1e-7)
+
+
 def test_curved_member():
     """A law acts on the change of the curvature: an arc of natural curvature 1 under a moment is another arc."""
     shape = {"type": "curvature", "kappa3": [1.0], "length": 1.0, "start": [1, 0]}
