@@ -473,6 +473,19 @@ def test_exported_code(tmp_path, law):
     assert re.match(r"(\d+) of \1 cases agree, \1 of them to the last bit", words), words
 
 
+@needs_compiler
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_steps_in_c(tmp_path, dimension):
+    """Time steps as a program in C, to the last bit."""
+    inertia = {"rhoA": 1.0, "rhoI": [0.01, 0.01, 0.01]}
+    motion = {"type": "dynamic", "end": 0.5, "integrator": "radau-3", "step": 0.01}
+    one = scene(RAMBERG, force([0.0, 2.0]), given(RAMBERG) | inertia, analysis=motion, dimension=dimension)
+    sfetcas.export(
+        one.replace({"members.beam.elements": 2, "members.beam.element": "SFET3"}), tmp_path / "c", name="motion"
+    )
+    assert "10 of 10 steps agree, 10 of them to the last bit" in said(built(tmp_path / "c", "motion"))
+
+
 def test_rigid_end():
     """A law beside a rigid member: the moment at the clamp of the rigid part is in balance."""
     one = Scene.from_dict(
