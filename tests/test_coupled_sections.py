@@ -138,6 +138,14 @@ def test_parameters():
     np.testing.assert_allclose(np.ravel(answers[1][asked[1]]), np.linalg.solve(matrix(COUPLED), moment), atol=1e-5)
 
 
+def test_stress_is_not_told():
+    """A shape with a coupling is of a material of which one modulus does not give the stress."""
+    shaped = {"shape": "rectangle", "width": 0.02, "height": 0.01, "E": 1e6, "nu": 0.3}
+    for more, told in (({}, True), ({"coupling": [2e-4, 0, 0]}, False)):
+        found = sfetcas.solve(scene(shaped | more).replace({"loads.tip.value": [0, 1e-3, 0]})).last
+        assert ("bending_stress" in found.along("beam", [0.0])) is told
+
+
 def test_plane_or_space():
     """Bending in x-y that is coupled with twist leaves the plane; what is coupled out of the plane alone does not."""
     for coupling, dimension in (([0.3, 0, 0], "plane"), ([0, 0.3, 0], "space"), ([0, 0, 0.3], "space")):
