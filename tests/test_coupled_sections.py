@@ -115,6 +115,16 @@ def test_small_member():
     np.testing.assert_allclose(ends[0][1:], ends[1][1:], rtol=2e-5)
 
 
+@pytest.mark.parametrize("share", [0.98, 1.02])
+def test_buckling_about_the_weak_axis(share):
+    """A column leaves the straight line at pi^2/4 of the smallest stiffness, which compliance of bending gives."""
+    softness = np.linalg.inv(matrix(COUPLED))[1:, 1:]
+    critical = 0.25 * np.pi**2 / np.linalg.eigvalsh(softness)[-1]
+    found = sfetcas.solve(scene(COUPLED).replace({"loads.tip.value": [-share * critical, 0, 0]})).last
+    assert found.certificate.stable is True
+    assert (np.linalg.norm(found.position("B")[1:]) > 0.1) == (share > 1.0)
+
+
 def test_parameters():
     """Derivatives of an answer by a coupling are those of differences, and the curvature is told."""
     name, asked = "sections.s.coupling.1", ["nodes.B.position", "members.beam.curvature at 0"]
@@ -126,6 +136,14 @@ def test_parameters():
         np.testing.assert_allclose(np.ravel(answers[1].jacobian[key][name]), slope, atol=1e-5)
     moment = shot(matrix(COUPLED), FORCE)[1]
     np.testing.assert_allclose(np.ravel(answers[1][asked[1]]), np.linalg.solve(matrix(COUPLED), moment), atol=1e-5)
+
+
+def test_stress_is_not_told():
+    """A shape with a coupling is of a material of which one modulus does not give the stress."""
+    shaped = {"shape": "rectangle", "width": 0.02, "height": 0.01, "E": 1e6, "nu": 0.3}
+    for more, told in (({}, True), ({"coupling": [2e-4, 0, 0]}, False)):
+        found = sfetcas.solve(scene(shaped | more).replace({"loads.tip.value": [0, 1e-3, 0]})).last
+        assert ("bending_stress" in found.along("beam", [0.0])) is told
 
 
 def test_plane_or_space():

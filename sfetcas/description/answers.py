@@ -111,11 +111,11 @@ def _supported(scene: Any, record: Any) -> bool:
 
 
 def outlined(scene: Any, record: Any) -> bool:
-    """Whether a member is flexible and its section has a shape and no law, so that its fibres are linear elastic."""
+    """Whether a member is flexible and its section has a shape alone, so that its fibres are linear elastic."""
     if record.type != "flexible":
         return False
     section = scene.sections[str(record.section)]
-    return section.shape is not None and section.law is None
+    return section.shape is not None and section.law is None and section.coupling is None
 
 
 TABLE = """
@@ -135,7 +135,7 @@ members.NAME.force at | N | x y z | statics, motion, parameters | section force:
 members.NAME.moment at | N m | x y z | statics, motion, parameters | section moment, likewise
 members.NAME.curvature at | 1/m | b1 b2 b3 | statics, motion, parameters | whole curvature about b1 (twist), b2, b3
 members.NAME.strain at | | b1 b2 b3 | statics, motion | stretch along b1, shear along b2, b3, where the section yields
-members.NAME.bending_strain at | | | statics, motion, parameters | largest in the section, where that has a shape
+members.NAME.bending_strain at | | | statics, motion, parameters | largest, with a shape and neither law nor coupling
 members.NAME.bending_stress at | Pa | | statics, motion, parameters | E times that strain
 members.NAME.velocity at | m/s | x y z | motion | of the centre line; not of small members
 members.NAME.angular_velocity at | rad/s | x y z | motion | of the sections; not of small members

@@ -10,7 +10,6 @@ numbers ``kappa`` is over a unit of curvature of the law, and ``d`` over its uni
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, final
@@ -146,16 +145,6 @@ class AlongElement(Term):
     @property
     def _element(self) -> Element:
         return element_by_name(f"SFET{self.nodes}", self.space, self.gauss)
-
-    @functools.cached_property
-    def changes(self) -> ca.Function:
-        """``(q, u, data) ->`` changes of twist and curvatures (3, nodes) at the points, over the unit of curvature."""
-        q, data = ca.SX.sym("q", self.components, self.nodes), ca.SX.sym("data", self.sizes[3])
-        points = ca.reshape(data, self.width, self.nodes)
-        bent = self._element.changes([ca.vertsplit(side) for side in ca.horzsplit(q)])
-        found = [self.bending(bent[k], points[:, k]) for k in range(self.nodes)]
-        nothing = ca.SX.sym("u", self.axes, 0)
-        return ca.Function(f"changes_{name_of(self)}", [q, nothing, data], [ca.densify(ca.horzcat(*found))])
 
 
 def law_of(scene: Scene, member: str) -> SectionLaw | None:

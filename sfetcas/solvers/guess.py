@@ -272,10 +272,14 @@ def _bow(equations: Equations) -> Array:
         member, line = model.scene.members[name], model.scene.center_lines[name]
         if line.turning > 0.05 or member.type == "rigid":
             continue
-        stiffness = model.scene.sections[str(member.section)].stiffness(np.array([0.5]))[0]
+        section = model.scene.sections[str(member.section)]
+        stiffness = section.stiffness(np.array([0.5]))[0]
         weak_2 = model.space and stiffness[1] < stiffness[2] * (1.0 - 1e-9)
         frame = quaternion.matrix(line.quaternions(np.array([0.0])))[0]
         axis = np.array([0.0, 0.0, 1.0]) if not model.space else (-frame[:, 1] if weak_2 else frame[:, 2])
+        if model.space and section.coupled:
+            # The axis in the section about which it is bent most easily.
+            axis = frame[:, 1:] @ np.linalg.eigh(section.compliance_matrix(np.array([0.5]))[0, 1:, 1:])[1][:, -1]
         inner = model.chain(name)[1:-1]
         vectors[inner] = BOW * np.sin(2.0 * np.pi * model.along(name)[1:-1])[:, None] * axis
     return vectors
