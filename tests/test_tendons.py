@@ -208,6 +208,25 @@ def test_varying_offset():
     np.testing.assert_allclose(step.position("B"), other.position("B"), atol=1e-9)
 
 
+@DIMENSIONS
+def test_curved_member(dimension):
+    """A bent rod is bent further by the same curvature, flexible or along a rigid part of it, whose length stays."""
+    turned = 0.8
+    scene = rod(dimension=dimension, tension=T).to_dict()
+    scene["nodes"]["B"]["position"] = arc(turned).tolist()
+    scene["members"]["m"]["shape"] = {"type": "arc", "angle": turned}
+    step = sfetcas.solve(Scene.from_dict(scene), accuracy=1e-9).last
+    np.testing.assert_allclose(step.position("B"), arc(turned + T * D / EI), atol=1e-9)
+    assert step.tendon("t")["length"] == pytest.approx(1.0 - D * (turned + T * D / EI), abs=1e-12)
+    np.testing.assert_allclose(step.along("m", [0.3])["moment"][0], [0.0, 0.0, T * D], atol=1e-8)
+    scene["members"]["m"]["type"] = "rigid"
+    scene["tendons"]["t"]["way"].append({"ground": [1.0, 1.5, 0.0]})
+    stiff = sfetcas.solve(Scene.from_dict(scene)).last
+    hole = arc(turned) + D * np.array([-np.sin(turned), np.cos(turned), 0.0])
+    straight = np.linalg.norm(np.array([1.0, 1.5, 0.0]) - hole)
+    assert stiff.tendon("t")["length"] == pytest.approx(1.0 - D * turned + straight, abs=1e-12)
+
+
 def test_direction_and_parts():
     """Ways backwards, and in parts one after the other, are the same."""
     one = sfetcas.solve(rod(), accuracy=1e-9).last.position("B")
