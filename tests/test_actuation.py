@@ -347,6 +347,51 @@ def test_places_of_prescribed_motions_matter_on_paths():
     )
 
 
+def sloping(x):
+    """The field :data:`LINEAR`."""
+    apart = [x[0] - 0.3, x[1] - 0.2]
+    return [0.1 + 0.4 * apart[0] - 0.7 * apart[1], 0.4 - 0.7 * apart[0] + 0.2 * apart[1], -0.6 * x[2]]
+
+
+@BOTH
+def test_field_as_a_function_of_the_place(dimension, tmp_path):
+    """The same field by its numbers and as a function, in answers, parameters, and the exported program."""
+    scene = pushed({"type": "function", "function": sloping}, dimension=dimension)
+    one, other = (sfetcas.solve(each, accuracy=SHARP).last for each in (scene, pushed(LINEAR, dimension=dimension)))
+    np.testing.assert_allclose(one.position("B"), other.position("B"), atol=1e-9)
+    for key in ("energy", "torque", "force"):
+        np.testing.assert_allclose(one.magnet("core")[key], other.magnet("core")[key], atol=1e-8)
+    family = sfetcas.parametric(scene, ["factor", "magnets.end.moment"], ["nodes.B.position"])
+    # To the accuracy that both ask for by default.
+    np.testing.assert_allclose(family.solve()["nodes.B.position"], other.position("B"), atol=1e-3)
+    solver = sfetcas.export(scene, tmp_path / "c", name="c", arguments=["factor"], results=["nodes.B.position"])
+    np.testing.assert_allclose(solver.solve()[1], family.solve()["nodes.B.position"], atol=1e-6)
+
+
+def test_fields_that_are_functions_are_told_wrong_ones():
+    for function, sentence in (
+        (lambda x: x[:2], "fields.B.function: found 2 components, accepted"),
+        (lambda x: [np.linalg.inv(x), 0, 0], "fields.B.function: found a function that fails"),
+        ("sloping", "fields.B.function: found 'sloping', accepted: a Python function"),
+    ):
+        with pytest.raises(SceneError, match=re.escape(sentence)):
+            pushed({"type": "function", "function": function})
+    with pytest.raises(SceneError, match=r"fields\.B\.function: found a Python function, which no file holds"):
+        sfetcas.dump(pushed({"type": "function", "function": sloping}), "scene.toml")
+    # What leaves the plane makes the scene one in space.
+    leaving = pushed({"type": "function", "function": lambda x: [0.1, 0.2, 0.3 * x[0]]})
+    assert leaving.resolved_dimension == "space"
+
+
+def test_path_of_natural_curvature():
+    """The chord of an arc has half the angle of its end."""
+    path = sfetcas.solve(actuated(3.0, more={"analysis": {"type": "path", "range": [0, 1.0]}}))
+    places = path.positions("B")
+    assert len(places) > 3
+    for factor, place in zip(path.main.factors, places, strict=True):
+        assert np.arctan2(place[1], place[0]) == pytest.approx(1.5 * factor, abs=1e-5)
+
+
 def test_uniform_field_as_one_without_gradient():
     flat = {"type": "linear", "value": [0.2, 0.4], "gradient": np.zeros((3, 3)).tolist()}
     one, other = (sfetcas.solve(pushed(field), accuracy=SHARP).last for field in (flat, {"value": [0.2, 0.4]}))

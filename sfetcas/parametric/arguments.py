@@ -205,7 +205,8 @@ def default_arguments(scene: Scene) -> list[str]:
     names += [f"histories.{name}" for name in scene.histories]
     names += [f"loads.{name}.value" for name in scene.loads]
     names += [f"actuations.{name}.value" for name in scene.actuations]
-    names += [f"fields.{name}.{'value' if field.value else 'moment'}" for name, field in scene.fields.items()]
+    for name, source in scene.fields.items():
+        names += [f"fields.{name}.{key}" for key in ("value", "moment") if getattr(source, key) is not None]
     for name, motion in scene.motions.items():
         keys = ("displacement", "rotation")
         names += [f"motions.{name}.{key}" for key in keys if getattr(motion, key) is not None]
