@@ -335,6 +335,38 @@ def test_forces_of_gradients_are_in_balance_with_reactions(field, elements, dime
     assert np.abs(moment).max() > 0.1
 
 
+@BOTH
+def test_rigid_arcs_are_pulled_as_all_of_them(dimension):
+    """A bent rigid magnet on a strip in two fields: forces, and the moment that its free end must not have."""
+    table = {
+        "dimension": dimension,
+        "sections": {"s": {**STIFF, "rhoI": [0.02, 0.01, 0.01]}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "H": {"position": [0.5, 0]},
+            "B": {"position": [1.5, 0]},
+        },
+        "members": {
+            "strip": {"nodes": ["A", "H"], "section": "s"},
+            "m": {"nodes": ["H", "B"], "section": "s", "type": "rigid", "shape": {"type": "arc", "angle": 1.8}},
+        },
+        "fields": {"B": LINEAR, "pole": POLE},
+        "magnets": {"core": {"member": "m", "moment_density": [1.0, 0.5]}},
+    }
+    found = sfetcas.solve(Scene.from_dict(table), accuracy=1e-8).last
+    assert len(found.model.mesh.cuts["m"]) > 3
+    told = found.magnet("core")
+    assert np.linalg.norm(told["force"]) > 0.3
+    np.testing.assert_allclose(found.reaction("A")[0] + told["force"], 0.0, atol=1e-12)
+    last = found.along("m", 1.0)
+    np.testing.assert_allclose([last["moment"][0], last["force"][0]], 0.0, atol=1e-11)
+    joined = found.along("strip", 1.0)["moment"] - found.along("m", 0.0)["moment"]
+    np.testing.assert_allclose(joined, 0.0, atol=1e-11)
+    still = {"type": "dynamic", "end": 0.05, "initial": "equilibrium", "accuracy": 1e-3, "output": 0.05}
+    moving = sfetcas.solve(Scene.from_dict({**table, "analysis": still})).steps[-1]
+    np.testing.assert_allclose(moving.reaction("A"), found.reaction("A"), atol=1e-4)
+
+
 def test_places_of_prescribed_motions_matter_on_paths():
     """A dipole that a motion carries along a gradient, against single solutions."""
     nodes = {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0], "support": "clamped"}}
@@ -636,6 +668,10 @@ WELL = [[1, 0, 0], [0, 1, 0], [0, 0, 0]]
         (magnet(node="B", moment=[1, 0], span=[0, 0.5]), "magnets.c.span: not accepted: the magnet is at a node"),
         (magnet(moment=[1, 0]), "magnets.c: neither member nor node is given"),
         (field(type="dipole", moment=[0, 0]), f"fields.B.moment: {ZERO}"),
+        (
+            {**magnet(node="B", moment=[1, 0]), **field(type="dipole", position=[1, 0], moment=[0, 1])},
+            "fields.B.position: found a place on the magnet 'c', where the field has no bounds",
+        ),
         (field(type="linear", value=[0, 1]), "fields.B: the key 'gradient' is missing"),
         (field(value=[0, 1], gradient=SADDLE), "fields.B.gradient: not accepted: the field is of type 'uniform'"),
         (field(type="linear", gradient=WELL), "fields.B.gradient: found [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]"),
