@@ -335,6 +335,38 @@ def test_forces_of_gradients_are_in_balance_with_reactions(field, elements, dime
     assert np.abs(moment).max() > 0.1
 
 
+@BOTH
+def test_rigid_arcs_are_pulled_as_all_of_them(dimension):
+    """A bent rigid magnet on a strip in two fields: forces, and the moment that its free end must not have."""
+    table = {
+        "dimension": dimension,
+        "sections": {"s": {**STIFF, "rhoI": [0.02, 0.01, 0.01]}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "H": {"position": [0.5, 0]},
+            "B": {"position": [1.5, 0]},
+        },
+        "members": {
+            "strip": {"nodes": ["A", "H"], "section": "s"},
+            "m": {"nodes": ["H", "B"], "section": "s", "type": "rigid", "shape": {"type": "arc", "angle": 1.8}},
+        },
+        "fields": {"B": LINEAR, "pole": POLE},
+        "magnets": {"core": {"member": "m", "moment_density": [1.0, 0.5]}},
+    }
+    found = sfetcas.solve(Scene.from_dict(table), accuracy=1e-8).last
+    assert len(found.model.mesh.cuts["m"]) > 3
+    told = found.magnet("core")
+    assert np.linalg.norm(told["force"]) > 0.3
+    np.testing.assert_allclose(found.reaction("A")[0] + told["force"], 0.0, atol=1e-12)
+    last = found.along("m", 1.0)
+    np.testing.assert_allclose([last["moment"][0], last["force"][0]], 0.0, atol=1e-11)
+    joined = found.along("strip", 1.0)["moment"] - found.along("m", 0.0)["moment"]
+    np.testing.assert_allclose(joined, 0.0, atol=1e-11)
+    still = {"type": "dynamic", "end": 0.05, "initial": "equilibrium", "accuracy": 1e-3, "output": 0.05}
+    moving = sfetcas.solve(Scene.from_dict({**table, "analysis": still})).steps[-1]
+    np.testing.assert_allclose(moving.reaction("A"), found.reaction("A"), atol=1e-4)
+
+
 def test_places_of_prescribed_motions_matter_on_paths():
     """A dipole that a motion carries along a gradient, against single solutions."""
     nodes = {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0], "support": "clamped"}}
@@ -345,6 +377,51 @@ def test_places_of_prescribed_motions_matter_on_paths():
     np.testing.assert_allclose(
         path.steps[-1].along("m", 0.4)["position"], single.last.along("m", 0.4)["position"], atol=1e-6
     )
+
+
+def sloping(x):
+    """The field :data:`LINEAR`."""
+    apart = [x[0] - 0.3, x[1] - 0.2]
+    return [0.1 + 0.4 * apart[0] - 0.7 * apart[1], 0.4 - 0.7 * apart[0] + 0.2 * apart[1], -0.6 * x[2]]
+
+
+@BOTH
+def test_field_as_a_function_of_the_place(dimension, tmp_path):
+    """The same field by its numbers and as a function, in answers, parameters, and the exported program."""
+    scene = pushed({"type": "function", "function": sloping}, dimension=dimension)
+    one, other = (sfetcas.solve(each, accuracy=SHARP).last for each in (scene, pushed(LINEAR, dimension=dimension)))
+    np.testing.assert_allclose(one.position("B"), other.position("B"), atol=1e-9)
+    for key in ("energy", "torque", "force"):
+        np.testing.assert_allclose(one.magnet("core")[key], other.magnet("core")[key], atol=1e-8)
+    family = sfetcas.parametric(scene, ["factor", "magnets.end.moment"], ["nodes.B.position"])
+    # To the accuracy that both ask for by default.
+    np.testing.assert_allclose(family.solve()["nodes.B.position"], other.position("B"), atol=1e-3)
+    solver = sfetcas.export(scene, tmp_path / "c", name="c", arguments=["factor"], results=["nodes.B.position"])
+    np.testing.assert_allclose(solver.solve()[1], family.solve()["nodes.B.position"], atol=1e-6)
+
+
+def test_fields_that_are_functions_are_told_wrong_ones():
+    for function, sentence in (
+        (lambda x: x[:2], "fields.B.function: found 2 components, accepted"),
+        (lambda x: [np.linalg.inv(x), 0, 0], "fields.B.function: found a function that fails"),
+        ("sloping", "fields.B.function: found 'sloping', accepted: a Python function"),
+    ):
+        with pytest.raises(SceneError, match=re.escape(sentence)):
+            pushed({"type": "function", "function": function})
+    with pytest.raises(SceneError, match=r"fields\.B\.function: found a Python function, which no file holds"):
+        sfetcas.dump(pushed({"type": "function", "function": sloping}), "scene.toml")
+    # What leaves the plane makes the scene one in space.
+    leaving = pushed({"type": "function", "function": lambda x: [0.1, 0.2, 0.3 * x[0]]})
+    assert leaving.resolved_dimension == "space"
+
+
+def test_path_of_natural_curvature():
+    """The chord of an arc has half the angle of its end."""
+    path = sfetcas.solve(actuated(3.0, more={"analysis": {"type": "path", "range": [0, 1.0]}}))
+    places = path.positions("B")
+    assert len(places) > 3
+    for factor, place in zip(path.main.factors, places, strict=True):
+        assert np.arctan2(place[1], place[0]) == pytest.approx(1.5 * factor, abs=1e-5)
 
 
 def test_uniform_field_as_one_without_gradient():
@@ -591,6 +668,10 @@ WELL = [[1, 0, 0], [0, 1, 0], [0, 0, 0]]
         (magnet(node="B", moment=[1, 0], span=[0, 0.5]), "magnets.c.span: not accepted: the magnet is at a node"),
         (magnet(moment=[1, 0]), "magnets.c: neither member nor node is given"),
         (field(type="dipole", moment=[0, 0]), f"fields.B.moment: {ZERO}"),
+        (
+            {**magnet(node="B", moment=[1, 0]), **field(type="dipole", position=[1, 0], moment=[0, 1])},
+            "fields.B.position: found a place on the magnet 'c', where the field has no bounds",
+        ),
         (field(type="linear", value=[0, 1]), "fields.B: the key 'gradient' is missing"),
         (field(value=[0, 1], gradient=SADDLE), "fields.B.gradient: not accepted: the field is of type 'uniform'"),
         (field(type="linear", gradient=WELL), "fields.B.gradient: found [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]"),

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, model_validator
@@ -106,7 +108,7 @@ class MagneticField(Record):
     ----------
     type : text
         ``uniform``; ``linear``: ``value`` at ``position``, and from there it changes by ``gradient``; ``dipole``: of
-        a small magnet at ``position``, with the dipole ``moment``.
+        a small magnet at ``position``, with the dipole ``moment``; ``function``: any, from Python.
     value : (3,), T, fixed axes
         The field at factor 1; of a linear one at ``position``.
     gradient : (3, 3), T/m, fixed axes
@@ -116,6 +118,8 @@ class MagneticField(Record):
         Of a linear field where it has the ``value``; of a dipole its place.  Default: the origin.
     moment : (3,), A m², fixed axes
         Of a dipole.
+    function : callable
+        In Python: place (3,), m, as a CasADi expression -> field (3,), T, at factor 1.
     history : name
         Name of a history that replaces the load factor of the step.
 
@@ -125,24 +129,33 @@ class MagneticField(Record):
     array([0.    , 0.    , 0.0002])
     """
 
-    type: Literal["uniform", "linear", "dipole"] = "uniform"
+    type: Literal["uniform", "linear", "dipole", "function"] = "uniform"
     value: Vector | None = None
     gradient: Gradient | None = None
     position: Vector = (0.0, 0.0, 0.0)
     moment: Direction | None = None
+    function: Callable[[Any], Any] | None = None
     history: str | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_text(cls, values: Any) -> Any:
+        if isinstance(values, Mapping) and values.get("function") is not None and not callable(values["function"]):
+            message = f"found {say(values['function'])}, accepted: a Python function of the place"
+            raise SceneError(message, ("function",))
+        return values
 
     @model_validator(mode="after")
     def _check(self) -> MagneticField:
-        needed = {"uniform": ("value",), "linear": ("gradient",), "dipole": ("moment",)}[self.type]
+        needed = {"uniform": "value", "linear": "gradient", "dipole": "moment", "function": "function"}[self.type]
         useless = {
-            "uniform": ("gradient", "moment", "position"),
-            "linear": ("moment",),
-            "dipole": ("value", "gradient"),
+            "uniform": ("gradient", "moment", "position", "function"),
+            "linear": ("moment", "function"),
+            "dipole": ("value", "gradient", "function"),
+            "function": ("value", "gradient", "moment", "position"),
         }[self.type]
-        for key in needed:
-            if getattr(self, key) is None:
-                raise SceneError(f"the key {key!r} is missing: a field of type {self.type!r} needs it")
+        if getattr(self, needed) is None:
+            raise SceneError(f"the key {needed!r} is missing: a field of type {self.type!r} needs it")
         for key in useless:
             if key in self.model_fields_set and getattr(self, key) is not None:
                 raise SceneError(f"not accepted: the field is of type {self.type!r}", (key,))
@@ -154,7 +167,33 @@ class MagneticField(Record):
                 raise SceneError(
                     f"found {say([list(row) for row in self.gradient])}, accepted: {accepted}", ("gradient",)
                 )
+        if self.function is not None:
+            self._evaluated()
         return self
+
+    def expression(self, place: ca.SX) -> ca.SX:
+        """The field (3,), T, of a ``function`` at a place (3,), m, at factor 1."""
+        assert self.function is not None
+        found = self.function(place)
+        entries: list[ca.SX] = list(found) if isinstance(found, (list, tuple)) else [ca.SX(found)]
+        return ca.vertcat(*entries)
+
+    def _evaluated(self) -> ca.Function:
+        """The field of a ``function`` as a CasADi function of the place.
+
+        Raises
+        ------
+        SceneError
+            The function does not take an expression, or does not give three.
+        """
+        place, accepted = ca.SX.sym("place", 3), "a function that makes three CasADi expressions of the place"
+        try:
+            found = self.expression(place)
+        except Exception as error:
+            raise SceneError(f"found a function that fails ({error}), accepted: {accepted}", ("function",)) from None
+        if found.numel() != 3:
+            raise SceneError(f"found {found.numel()} components, accepted: {accepted}", ("function",))
+        return ca.Function("field", [place], [ca.densify(ca.vec(found))])
 
     @property
     def uniform(self) -> bool:
@@ -169,6 +208,9 @@ class MagneticField(Record):
     def of(self, place: ArrayLike) -> NDArray[np.float64]:
         """The field (..., 3), T, at places (..., 3), m, in the fixed axes, at factor 1."""
         apart = np.asarray(place, dtype=float) - np.array(self.position)
+        if self.function is not None:
+            values = self._evaluated().map(apart.size // 3)(apart.reshape(-1, 3).T).full()
+            return np.asarray(values.T.reshape(apart.shape))
         if self.type == "dipole":
             moment = np.array(self.moment)
             distance = np.linalg.norm(apart, axis=-1, keepdims=True)
@@ -182,6 +224,8 @@ class MagneticField(Record):
         """A magnitude, T, or of a dipole T m³."""
         if self.type == "dipole" and self.moment is not None:
             return PERMEABILITY * math.hypot(*self.moment)
+        if self.function is not None:
+            return float(np.linalg.norm(self.of(np.zeros(3))))
         return math.hypot(*self.vector)
 
 

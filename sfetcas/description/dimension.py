@@ -56,7 +56,7 @@ def out_of_plane(
         _cylindrical(nodes, members),
         _contacts(contacts),
         _actuations(actuations, lines),
-        _fields(fields),
+        _fields(fields, nodes),
         _magnets(magnets, lines),
         _tendons(tendons, lines),
     )
@@ -175,12 +175,16 @@ def _actuations(actuations: Mapping[str, Actuation], lines: Mapping[str, CenterL
             yield ("actuations", name, "value"), "bends or twists out of x-y"
 
 
-def _fields(fields: Mapping[str, MagneticField]) -> Iterator[Finding]:
+def _fields(fields: Mapping[str, MagneticField], nodes: Mapping[str, Node]) -> Iterator[Finding]:
     for name, field in fields.items():
         for key in ("value", "moment", "position"):
             vector = getattr(field, key)
             if vector is not None and _leaves(vector):
                 yield ("fields", name, key), "has a z component"
+        if field.function is not None:
+            values = field.of([node.position for node in nodes.values()])
+            if np.abs(values[:, 2]).max() > tolerances.DECIMAL * np.abs(values).max():
+                yield ("fields", name, "function"), "has a z component"
         if field.gradient is None:
             continue
         slopes = np.abs(field.gradient)[:2]

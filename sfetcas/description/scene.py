@@ -612,6 +612,20 @@ def _check_actuated(scene: Scene) -> None:
                 f"node {magnet.node!r} has no rotation of its own that a dipole turns with, as its joint is a {joint}"
             )
             raise SceneError(message, ("magnets", name, "node"))
+        _check_apart(scene, name, magnet)
+
+
+def _check_apart(scene: Scene, name: str, magnet: Magnet) -> None:
+    """Refuse the field of a dipole at its own place, where it has no bounds."""
+    if magnet.member is None:
+        places = np.array([scene.nodes[str(magnet.node)].position])
+    else:
+        places = scene.center_lines[magnet.member].positions(np.linspace(*magnet.span, 257))
+    for field in (field for field in scene.fields if scene.fields[field].type == "dipole"):
+        apart = np.linalg.norm(places - np.array(scene.fields[field].position), axis=1).min()
+        if apart < tolerances.WRITTEN * scene.size:
+            message = f"found a place on the magnet {name!r}, where the field has no bounds, accepted: one beside it"
+            raise SceneError(message, ("fields", field, "position"))
 
 
 def _check_springs(scene: Scene) -> None:

@@ -123,6 +123,10 @@ def dump(scene: Scene, path: str | os.PathLike[str]) -> None:
         Other ending, no permission, no space or no package for TOML; the sentence starts with the path.
     """
     check_scene(scene, "dump({}, ...)")
+    for name, field in scene.fields.items():
+        if field.function is not None:
+            message = "found a Python function, which no file holds, accepted: the types uniform, linear and dipole"
+            raise SceneError(message, ("fields", name, "function"))
     try:
         _write(Path(path), _text(scene, _format(Path(path))))
     except SceneError as error:

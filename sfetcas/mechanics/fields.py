@@ -243,7 +243,7 @@ class Fields:
             group = model.connections[number]
             batch = GroupBatch(model, group, answers_of(group.kind))
             total += batch(self.q, self._nodal, self.state.unwrapped, loads[number])[0][own].sum(axis=0)
-        energy, torque = float(total[0]) * model.scales.moment, total[1:4] * model.scales.moment
+        energy, torque = float(total[0] * model.scales.moment), total[1:4] * model.scales.moment
         return {"energy": energy, "torque": torque, "force": total[4:] * model.scales.force}
 
     def _along(self, member: str, x: Array, *, pressed: bool = True) -> dict[str, Array]:

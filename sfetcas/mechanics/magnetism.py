@@ -8,6 +8,8 @@ and couples are exactly the derivatives of one energy.
 
 from __future__ import annotations
 
+import functools
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, final
@@ -31,6 +33,29 @@ Law = Literal["uniform", "linear", "dipole"]
 
 
 @dataclass(frozen=True)
+class FieldFunction:
+    """A field as a function of the place from Python, with the unit of length (m) of the model."""
+
+    field: MagneticField
+    unit: float
+
+    def __hash__(self) -> int:
+        return hash((id(self.field.function), self.unit))
+
+    def __str__(self) -> str:
+        return f"function{_numbered(self)}"
+
+
+@functools.cache
+def _numbered(function: FieldFunction) -> int:
+    """A number that names a function."""
+    return next(_COUNT)
+
+
+_COUNT = itertools.count()
+
+
+@dataclass(frozen=True)
 class _InField(Term):
     """What magnets have in common.
 
@@ -48,7 +73,7 @@ class _InField(Term):
         **{f"force_{axis}": "N" for axis in "xyz"},
     }
 
-    law: Law
+    law: Law | FieldFunction
 
     @property
     def proportional(self) -> bool:
@@ -63,12 +88,17 @@ class _InField(Term):
     @property
     def strengths(self) -> int:
         """How many numbers a field has."""
+        if isinstance(self.law, FieldFunction):
+            return 1
         return self.axes + (self.axes**2 if self.law == "linear" else 0)
 
     def field(self, load: ca.SX, x: ca.SX) -> ca.SX:
         """The field, T, at a place relative to its position, over the unit of length."""
         if self.law == "uniform":
             return load
+        if isinstance(self.law, FieldFunction):
+            whole = x if self.space else ca.vertcat(x, 0)
+            return load * self.law.field.expression(self.law.unit * whole)[: self.axes]
         if self.law == "linear":
             return load[: self.axes] + ca.mtimes(ca.reshape(load[self.axes :], self.axes, self.axes).T, x)
         square = ca.dot(x, x)
@@ -205,14 +235,18 @@ def magnets_in(parts: Parts) -> Iterator[One]:
             yield from found(parts, name, magnet, law, position, loads)
 
 
-def _laws(fields: Mapping[str, MagneticField], parts: Parts) -> list[tuple[Law, Array, dict[str | None, Any]]]:
+def _laws(
+    fields: Mapping[str, MagneticField], parts: Parts
+) -> list[tuple[Law | FieldFunction, Array, dict[str | None, Any]]]:
     """Kind, position (m) and load of each field by its history; all uniform fields add up to one."""
     axes, unit = parts.element.axes, parts.scales.length
-    found: list[tuple[Law, Array, dict[str | None, Any]]] = []
+    found: list[tuple[Law | FieldFunction, Array, dict[str | None, Any]]] = []
     uniform: dict[str | None, Any] = {}
     for field in fields.values():
         position = numbers(field.position)[:axes]
-        if field.uniform:
+        if field.function is not None:
+            found.append((FieldFunction(field, float(unit)), position, {field.history: np.ones(1)}))
+        elif field.uniform:
             value = numbers(field.vector)[:axes]
             uniform[field.history] = uniform[field.history] + value if field.history in uniform else value
         elif field.type == "dipole":
@@ -226,7 +260,12 @@ def _laws(fields: Mapping[str, MagneticField], parts: Parts) -> list[tuple[Law, 
 
 
 def _at_node(
-    parts: Parts, name: str, magnet: Magnet, law: Law, position: Array, loads: Mapping[str | None, Array]
+    parts: Parts,
+    name: str,
+    magnet: Magnet,
+    law: Law | FieldFunction,
+    position: Array,
+    loads: Mapping[str | None, Array],
 ) -> Iterator[One]:
     axes, node = parts.element.axes, str(magnet.node)
     turn = parts.rotations.node_turn[node]
@@ -241,7 +280,12 @@ def _at_node(
 
 
 def _along_member(
-    parts: Parts, name: str, magnet: Magnet, law: Law, position: Array, loads: Mapping[str | None, Array]
+    parts: Parts,
+    name: str,
+    magnet: Magnet,
+    law: Law | FieldFunction,
+    position: Array,
+    loads: Mapping[str | None, Array],
 ) -> Iterator[One]:
     scene, element, member = parts.scene, parts.element, str(magnet.member)
     if element.gauss:

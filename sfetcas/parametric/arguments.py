@@ -221,7 +221,8 @@ def default_arguments(scene: Scene) -> list[str]:
         pulls = ("tension", "pressure", "pull", "length")
         names += [f"tendons.{name}.{key}" for key in pulls if getattr(tendon, key) is not None]
     names += [f"actuations.{name}.value" for name in scene.actuations]
-    names += [f"fields.{name}.{'value' if field.value else 'moment'}" for name, field in scene.fields.items()]
+    for name, source in scene.fields.items():
+        names += [f"fields.{name}.{key}" for key in ("value", "moment") if getattr(source, key) is not None]
     for name, motion in scene.motions.items():
         keys = ("displacement", "rotation")
         names += [f"motions.{name}.{key}" for key in keys if getattr(motion, key) is not None]
