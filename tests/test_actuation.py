@@ -410,6 +410,8 @@ def test_fields_that_are_functions_are_told_wrong_ones():
             pushed({"type": "function", "function": function})
     with pytest.raises(SceneError, match=r"fields\.B\.function: found a Python function, which no file holds"):
         sfetcas.dump(pushed({"type": "function", "function": sloping}), "scene.toml")
+    with pytest.raises(SceneError, match="found a field whose function takes numbers only"):
+        sfetcas.solve(pushed({"type": "function", "function": lambda x: [float(x[0]), 0, 0]}))
     # What leaves the plane makes the scene one in space.
     leaving = pushed({"type": "function", "function": lambda x: [0.1, 0.2, 0.3 * x[0]]})
     assert leaving.resolved_dimension == "space"

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal
 
-import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, model_validator
@@ -17,7 +16,7 @@ from ..mathematics.arrays import numbers
 from .records import Direction, Record, Turn, Vector, listed, number, say
 from .sections import Quantity, Varying, breaks, evaluate
 
-__all__ = ["PERMEABILITY", "Actuation", "Magnet", "MagneticField"]
+__all__ = ["ANYWHERE", "PERMEABILITY", "Actuation", "Magnet", "MagneticField"]
 
 
 def _span(value: Any) -> tuple[float, float]:
@@ -119,7 +118,7 @@ class MagneticField(Record):
     moment : (3,), A m², fixed axes
         Of a dipole.
     function : callable
-        In Python: place (3,), m, as a CasADi expression -> field (3,), T, at factor 1.
+        In Python: place (3,), m, numbers or CasADi expressions -> field (3,), T, at factor 1.
     history : name
         Name of a history that replaces the load factor of the step.
 
@@ -168,32 +167,27 @@ class MagneticField(Record):
                     f"found {say([list(row) for row in self.gradient])}, accepted: {accepted}", ("gradient",)
                 )
         if self.function is not None:
-            self._evaluated()
+            self._called(ANYWHERE)
         return self
 
-    def expression(self, place: ca.SX) -> ca.SX:
-        """The field (3,), T, of a ``function`` at a place (3,), m, at factor 1."""
-        assert self.function is not None
-        found = self.function(place)
-        entries: list[ca.SX] = list(found) if isinstance(found, (list, tuple)) else [ca.SX(found)]
-        return ca.vertcat(*entries)
-
-    def _evaluated(self) -> ca.Function:
-        """The field of a ``function`` as a CasADi function of the place.
+    def _called(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The field (3,), T, that the ``function`` gives at a place (3,), m.
 
         Raises
         ------
         SceneError
-            The function does not take an expression, or does not give three.
+            It fails, or gives other than three numbers.
         """
-        place, accepted = ca.SX.sym("place", 3), "a function that makes three CasADi expressions of the place"
+        assert self.function is not None
         try:
-            found = self.expression(place)
-        except Exception as error:
-            raise SceneError(f"found a function that fails ({error}), accepted: {accepted}", ("function",)) from None
-        if found.numel() != 3:
-            raise SceneError(f"found {found.numel()} components, accepted: {accepted}", ("function",))
-        return ca.Function("field", [place], [ca.densify(ca.vec(found))])
+            with np.errstate(all="ignore"):
+                found = np.array(self.function(place), dtype=float).ravel()
+        except (TypeError, ValueError, AttributeError, IndexError, ArithmeticError, NotImplementedError) as error:
+            message = f"found a function that fails ({error}), accepted: {FUNCTION}"
+            raise SceneError(message, ("function",)) from None
+        if found.size != 3:
+            raise SceneError(f"found {found.size} components, accepted: {FUNCTION}", ("function",))
+        return found
 
     @property
     def uniform(self) -> bool:
@@ -209,8 +203,7 @@ class MagneticField(Record):
         """The field (..., 3), T, at places (..., 3), m, in the fixed axes, at factor 1."""
         apart = np.asarray(place, dtype=float) - np.array(self.position)
         if self.function is not None:
-            values = self._evaluated().map(apart.size // 3)(apart.reshape(-1, 3).T).full()
-            return np.asarray(values.T.reshape(apart.shape))
+            return np.array([self._called(each) for each in apart.reshape(-1, 3)]).reshape(apart.shape)
         if self.type == "dipole":
             moment = np.array(self.moment)
             distance = np.linalg.norm(apart, axis=-1, keepdims=True)
@@ -225,9 +218,13 @@ class MagneticField(Record):
         if self.type == "dipole" and self.moment is not None:
             return PERMEABILITY * math.hypot(*self.moment)
         if self.function is not None:
-            return float(np.linalg.norm(self.of(np.zeros(3))))
+            return float(np.linalg.norm(self._called(ANYWHERE)))
         return math.hypot(*self.vector)
 
+
+FUNCTION = "a function that makes three components of the place, of numbers and of CasADi expressions alike"
+ANYWHERE = np.array([0.137, 0.241, 0.053])
+"""A place, m, at which a function is tried."""
 
 PERMEABILITY = 1e-7
 """Magnetic constant over 4 pi, T m/A."""

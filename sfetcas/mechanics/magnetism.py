@@ -17,7 +17,8 @@ from typing import Any, ClassVar, Literal, final
 import casadi as ca
 import numpy as np
 
-from ..description.actuation import PERMEABILITY, Magnet, MagneticField
+from .. import tolerances
+from ..description.actuation import ANYWHERE, PERMEABILITY, Magnet, MagneticField
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers
@@ -41,6 +42,31 @@ class FieldFunction:
 
     def __hash__(self) -> int:
         return hash((id(self.field.function), self.unit))
+
+    def __post_init__(self) -> None:
+        """Refuse a function that takes numbers only, or makes something else of expressions.
+
+        Raises
+        ------
+        SceneError
+            It does.
+        """
+        place, accepted = ca.SX.sym("place", 3), "one that makes CasADi expressions, without float(...), if and math"
+        sentence = f"found a field whose function takes numbers only, accepted: {accepted}"
+        try:
+            function = ca.Function("field", [place], [self.expression(place)])
+        except (TypeError, ValueError, AttributeError, NotImplementedError, RuntimeError):
+            raise SceneError(sentence) from None
+        found, wanted = function(ANYWHERE / self.unit).full().ravel(), self.field.of(ANYWHERE)
+        if not np.allclose(found, wanted, rtol=tolerances.WRITTEN, atol=0.0):
+            raise SceneError(sentence)
+
+    def expression(self, place: ca.SX) -> ca.SX:
+        """The field (3,), T, at a place (3,) over the unit of length."""
+        assert self.field.function is not None
+        found = self.field.function(self.unit * place)
+        entries: list[ca.SX] = list(found) if isinstance(found, (list, tuple)) else [ca.SX(found)]
+        return ca.vertcat(*entries)
 
     def __str__(self) -> str:
         return f"function{_numbered(self)}"
@@ -98,7 +124,7 @@ class _InField(Term):
             return load
         if isinstance(self.law, FieldFunction):
             whole = x if self.space else ca.vertcat(x, 0)
-            return load * self.law.field.expression(self.law.unit * whole)[: self.axes]
+            return load * self.law.expression(whole)[: self.axes]
         if self.law == "linear":
             return load[: self.axes] + ca.mtimes(ca.reshape(load[self.axes :], self.axes, self.axes).T, x)
         square = ca.dot(x, x)
