@@ -32,9 +32,11 @@ PROBLEMS = Path(__file__).parent.parent / "problems"
 
 
 def is_static(file):
-    """Without contacts; by the text, as making scenes of all files at each start of the tests takes seconds."""
+    """Without contacts and slack tendons; by the text, as making scenes of all at each start of tests takes seconds."""
     table = tomllib.loads(file.read_text(encoding="utf-8"))
-    return table.get("analysis", {}).get("type", "static") == "static" and "contacts" not in table
+    measured = [{"pull", "length"} & set(t) and not t.get("pushes") for t in table.get("tendons", {}).values()]
+    static = table.get("analysis", {}).get("type", "static") == "static"
+    return static and "contacts" not in table and not any(measured)
 
 
 STATIC = [file for file in sorted(PROBLEMS.glob("*.toml")) if is_static(file)]

@@ -400,8 +400,8 @@ class Equations:
         found = self._evaluated(state, acting).groups
         pairs = zip(found, self.model.terms, strict=True)
         shares = [np.zeros_like(part[3]) if group.kind.is_load else part[3].copy() for part, group in pairs]
-        couples = acting.torque.reshape(len(acting.torque), -1)
-        shares[0][:, : couples.shape[1]] -= couples
+        width = int(np.prod(acting.torque.shape[1:]))
+        shares[0][:, :width] -= acting.torque.reshape(len(acting.torque), width)
         return shares
 
     @functools.cached_property
