@@ -121,7 +121,7 @@ def test_part_of_a_member_and_a_profile():
     """A free strip turns by the integral of its natural curvature, also where several actuations meet."""
     profile = {"at": [0, 0.5, 1], "value": [1, 2, 0]}
     table = {
-        "one": {"member": "m", "value": 1.1, "span": [0.25, 0.75], "profile": profile},
+        "one": {"member": "m", "value": 1.1, "from": 0.25, "to": 0.75, "profile": profile},
         "two": {"member": "m", "value": [0, 0, -0.4], "profile": {"polynomial": [0, 0, 3]}},
     }
     found = sfetcas.solve(strip(actuations=table), accuracy=SHARP).last
@@ -659,7 +659,7 @@ WELL = [[1, 0, 0], [0, 1, 0], [0, 0, 0]]
         (natural(value=1.0, member="n"), "actuations.k.member: found 'n', accepted: m"),
         (natural(), "actuations.k: the key 'value' is missing"),
         (natural(value=1.0, history="h"), "actuations.k.history: found 'h', but the scene has no histories"),
-        (natural(value=1.0, span=[0.5, 0.2]), "actuations.k.span: found [0.5, 0.2], accepted: [from, to]"),
+        (natural(value=1.0, from_=0.5, to=0.2), "actuations.k.to: found 0.5 to 0.2, accepted: an end after"),
         (natural(value=1.0, begin=0.2), "actuations.k: unknown key 'begin'"),
         ({"magnets": {"c": {"member": "m", "moment_density": [1, 0]}}}, "magnets: found magnets without a field"),
         (field(value=[1, 0]), "fields: found a field without magnets"),
@@ -667,7 +667,7 @@ WELL = [[1, 0, 0], [0, 1, 0], [0, 0, 0]]
         (magnet(node="q", moment=[1, 0]), "magnets.c.node: found 'q', accepted: A, B"),
         (magnet(member="m", moment_density=[0, 0]), f"magnets.c.moment_density: {ZERO}"),
         (magnet(member="m", moment=[1, 0]), "magnets.c: the key 'moment_density' is missing: the magnet is along"),
-        (magnet(node="B", moment=[1, 0], span=[0, 0.5]), "magnets.c.span: not accepted: the magnet is at a node"),
+        (magnet(node="B", moment=[1, 0], from_=0, to=0.5), "magnets.c.from: not accepted: the magnet is at a node"),
         (magnet(moment=[1, 0]), "magnets.c: neither member nor node is given"),
         (field(type="dipole", moment=[0, 0]), f"fields.B.moment: {ZERO}"),
         (
@@ -706,7 +706,7 @@ def test_rigid_members_have_no_natural_curvature_and_gauss_points_no_magnets():
     assert bent.angle("B") == pytest.approx(1.5, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["actuations.k.span", "actuations.k.span.0"])
+@pytest.mark.parametrize("name", ["actuations.k.from", "actuations.k.to"])
 def test_where_an_actuation_begins_is_no_parameter(name):
     with pytest.raises(SceneError, match="changes the elements"):
-        sfetcas.parametric(actuated(1.0, span=[0.2, 0.6]), [name], ["nodes.B.angle"])
+        sfetcas.parametric(actuated(1.0, from_=0.2, to=0.6), [name], ["nodes.B.angle"])

@@ -229,7 +229,7 @@ def test_expressions_say_what_answers_say():
             "magnet": {"type": "dipole", "position": [0.2, 0.4, -0.3], "moment": [100.0, 200.0, 50.0]},
         },
         magnets={
-            "strip": {"member": "m", "moment_density": [0.1, 0.02, 0.03], "span": [0.1, 0.9]},
+            "strip": {"member": "m", "moment_density": [0.1, 0.02, 0.03], "from": 0.1, "to": 0.9},
             "tip": {"node": "B", "moment": [0.05, 0, 0.02]},
         },
     )

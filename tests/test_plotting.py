@@ -205,7 +205,7 @@ def test_magnets_fields_and_natural_curvature_are_drawn():
     tables = {
         "fields": {"up": {"value": [0, 0.5]}},
         "magnets": {"end": {"node": "B", "moment": [2.0, 0]}},
-        "actuations": {"k": {"member": "m", "value": 0.8, "span": [0.2, 0.6]}},
+        "actuations": {"k": {"member": "m", "value": 0.8, "from": 0.2, "to": 0.6}},
     }
     solution = beam(loads={}, **tables)
     figure = picture(solution)

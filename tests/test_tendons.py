@@ -203,8 +203,8 @@ def test_varying_offset():
         np.testing.assert_allclose(step.position("B"), exact, atol=1e-9)
     linear = {"at": [0, 0.3, 1], "value": [0.1, 0.05, 0.05]}
     step = sfetcas.solve(rod([{"member": "m", "offset": [linear, 0.0]}]), accuracy=1e-9).last
-    parts = [{"member": "m", "offset": {"polynomial": [0.1, -0.05 / 0.3]}, "span": [0, 0.3]}]
-    other = sfetcas.solve(rod([*parts, {"member": "m", "offset": 0.05, "span": [0.3, 1]}]), accuracy=1e-9).last
+    parts = [{"member": "m", "offset": {"polynomial": [0.1, -0.05 / 0.3]}, "from": 0, "to": 0.3}]
+    other = sfetcas.solve(rod([*parts, {"member": "m", "offset": 0.05, "from": 0.3, "to": 1}]), accuracy=1e-9).last
     np.testing.assert_allclose(step.position("B"), other.position("B"), atol=1e-9)
 
 
@@ -231,8 +231,8 @@ def test_direction_and_parts():
     """Ways backwards, and in parts one after the other, are the same."""
     one = sfetcas.solve(rod(), accuracy=1e-9).last.position("B")
     for way in (
-        [{"member": "m", "offset": D, "span": [1, 0]}],
-        [{"member": "m", "offset": D, "span": [0, 0.37]}, {"member": "m", "offset": D, "span": [0.37, 1]}],
+        [{"member": "m", "offset": D, "from": 1, "to": 0}],
+        [{"member": "m", "offset": D, "from": 0, "to": 0.37}, {"member": "m", "offset": D, "from": 0.37, "to": 1}],
         [{"member": "m", "offset": [D, 0]}],
     ):
         np.testing.assert_allclose(sfetcas.solve(rod(way), accuracy=1e-9).last.position("B"), one, atol=1e-9)
@@ -240,7 +240,7 @@ def test_direction_and_parts():
 
 def test_part_of_a_member():
     """Beyond the place where a tendon ends the rod is straight."""
-    step = sfetcas.solve(rod([{"member": "m", "offset": D, "span": [0, 0.5]}]), accuracy=1e-9).last
+    step = sfetcas.solve(rod([{"member": "m", "offset": D, "from": 0, "to": 0.5}]), accuracy=1e-9).last
     along = step.along("m", [0.25, 0.75])
     np.testing.assert_allclose(along["moment"][:, 2], [T * D, 0.0], atol=1e-9)
     np.testing.assert_allclose(along["force"][1], 0.0, atol=1e-9)
@@ -747,7 +747,8 @@ def test_picture():
         ({"way": [{"member": "m"}]}, "tendons.t: accepted: one of 'tension'"),
         ({"way": [{"member": "m"}], "tension": 1.0, "stiffness": 2.0}, "tendons.t.stiffness: found with a tension"),
         ({"way": [{"member": "m", "node": "A"}], "tension": 1.0}, "way.0: found node and member, accepted: one of"),
-        ({"way": [{"member": "m", "span": [0, 2]}], "tension": 1.0}, "way.0.span: found"),
+        ({"way": [{"member": "m", "from": 0, "to": 2}], "tension": 1.0}, "way.0.to: found 2, accepted"),
+        ({"way": [{"member": "m", "from": 0.5, "to": 0.5}], "tension": 1.0}, "way.0.to: found 0.5 to 0.5, accepted"),
         ({"way": [{"member": "m", "discs": 0}], "tension": 1.0}, "way.0.discs: found 0, accepted: a number of discs"),
         ({"way": [{"member": "m", "offset": [1, 2, 3]}], "tension": 1.0}, "way.0.offset: found three numbers"),
         ({"way": [{"node": "A", "discs": 3}], "tension": 1.0}, "way.0.discs: not accepted with a node"),

@@ -8,23 +8,15 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BeforeValidator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.arrays import numbers
-from .records import Direction, Record, Turn, Vector, listed, number, say
+from .records import Direction, Fraction, Record, Turn, Vector, listed, number, say
 from .sections import Quantity, Varying, breaks, evaluate
 
 __all__ = ["ANYWHERE", "PERMEABILITY", "Actuation", "Magnet", "MagneticField"]
-
-
-def _span(value: Any) -> tuple[float, float]:
-    accepted = "[from, to], rising fractions of the length, from 0 to 1"
-    ends = tuple(number(entry) for entry in listed(value, accepted))
-    if len(ends) != 2 or not 0.0 <= ends[0] < ends[1] <= 1.0:
-        raise ValueError(f"found {say(value)}, accepted: {accepted}")
-    return ends[0], ends[1]
 
 
 def _gradient(value: Any) -> tuple[tuple[float, ...], ...]:
@@ -35,11 +27,7 @@ def _gradient(value: Any) -> tuple[tuple[float, ...], ...]:
     return rows
 
 
-Span = Annotated[tuple[float, float], BeforeValidator(_span)]
 Gradient = Annotated[tuple[tuple[float, ...], ...], BeforeValidator(_gradient)]
-
-WHOLE = (0.0, 1.0)
-"""All of a member."""
 
 
 def _profile(profile: Quantity | None, x: ArrayLike) -> NDArray[np.float64]:
@@ -50,6 +38,11 @@ def _profile(profile: Quantity | None, x: ArrayLike) -> NDArray[np.float64]:
 def _kinks(profile: Quantity | None, span: tuple[float, float]) -> tuple[float, ...]:
     """Fractions of the length at which what has a profile and a span begins, ends, or has a kink."""
     return (*span, *(() if profile is None else breaks(profile)))
+
+
+def _check_ends(begin: float, end: float) -> None:
+    if not end - begin > tolerances.DECIMAL:
+        raise SceneError(f"found {begin:g} to {end:g}, accepted: an end after the beginning", ("to",))
 
 
 class Actuation(Record):
@@ -64,8 +57,10 @@ class Actuation(Record):
         Name of the flexible member.
     value : (3,), 1/m, about b1 (twist), b2 and b3 of the sections
         What is added to the natural twist and curvature at factor 1.  One number is the curvature about b3.
-    span : (2,), fractions of the length
-        ``[from, to]``: the part of the member that it acts on.  Default: all of it.
+    from_ : 1
+        Fraction of the length where it begins.  In Python ``from_``, in files ``from``.  Default: ``0.0``.
+    to : 1
+        Fraction of the length where it ends.  Default: ``1.0``.
     profile : number or varying
         Factor along the member.
     history : name
@@ -73,15 +68,26 @@ class Actuation(Record):
 
     Examples
     --------
-    >>> Actuation(member="finger", value=3.0, span=[0.2, 0.8]).vector
+    >>> Actuation(member="finger", value=3.0, from_=0.2, to=0.8).vector
     (0.0, 0.0, 3.0)
     """
 
     member: str
     value: Turn
-    span: Span = WHOLE
+    from_: Fraction = Field(default=0.0, alias="from")
+    to: Fraction = 1.0
     profile: Varying | None = None
     history: str | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Actuation:
+        _check_ends(*self.span)
+        return self
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Fractions (2,) of the length where it begins and ends."""
+        return self.from_, self.to
 
     @property
     def vector(self) -> tuple[float, float, float]:
@@ -243,8 +249,10 @@ class Magnet(Record):
         Of a dipole at a node, with which it turns.
     moment_density : (3,), A m, along b1 (the tangent), b2 and b3 of the sections
         Of a member: magnetic moment (A m²) per metre, the magnetisation (A/m) times the area.
-    span : (2,), fractions of the length
-        ``[from, to]``: the part of the member that is magnetised.  Default: all of it.
+    from_ : 1
+        Of a member: fraction of the length where it is magnetised from.  In Python ``from_``, in files ``from``.
+    to : 1
+        Of a member: fraction of the length where that ends.
     profile : number or varying
         Of a member: factor along it.
     """
@@ -253,7 +261,8 @@ class Magnet(Record):
     node: str | None = None
     moment: Direction | None = None
     moment_density: Direction | None = None
-    span: Span = WHOLE
+    from_: Fraction = Field(default=0.0, alias="from")
+    to: Fraction = 1.0
     profile: Varying | None = None
 
     @model_validator(mode="after")
@@ -265,10 +274,16 @@ class Magnet(Record):
         where = "at a node" if self.member is None else "along a member"
         if getattr(self, needed) is None:
             raise SceneError(f"the key {needed!r} is missing: the magnet is {where}")
-        for key in (other, *(("span", "profile") if self.member is None else ())):
+        for key in (other, *(("from_", "to", "profile") if self.member is None else ())):
             if key in self.model_fields_set and getattr(self, key) is not None:
-                raise SceneError(f"not accepted: the magnet is {where}", (key,))
+                raise SceneError(f"not accepted: the magnet is {where}", (key.rstrip("_"),))
+        _check_ends(*self.span)
         return self
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Fractions (2,) of the length of a member between which it is magnetised."""
+        return self.from_, self.to
 
     @property
     def vector(self) -> tuple[float, float, float]:

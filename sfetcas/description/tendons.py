@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Annotated, Any, final
 
 import numpy as np
-from pydantic import BeforeValidator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
@@ -58,14 +58,6 @@ def _discs(value: Any) -> Any:
     return entries
 
 
-def _span(value: Any) -> tuple[float, float]:
-    accepted = "[from, to], two different fractions of the length from 0 to 1"
-    entries = tuple(number(entry) for entry in listed(value, accepted))
-    if len(entries) != 2 or not all(0.0 <= entry <= 1.0 for entry in entries) or entries[0] == entries[1]:
-        raise ValueError(f"found {say(value)}, accepted: {accepted}")
-    return entries[0], entries[1]
-
-
 @final
 class Coil(Record):
     """A way that winds around a member at a constant distance.
@@ -75,7 +67,7 @@ class Coil(Record):
     radius : m
         Distance from the centre line.
     turns : 1
-        Turns over the span, by the right hand about b1 where they are above zero.
+        Turns over the part of the member, by the right hand about b1 where they are above zero.
     phase : rad
         Angle from b2 towards b3 at which it begins.
     """
@@ -102,12 +94,15 @@ class Way(Record):
         offset along b2, and each may be a varying quantity.  Default: zero.
     helix : table
         Instead of an offset along a member: the table ``radius``, ``turns``, ``phase``.
-    span : (2,), 1
-        Along a member: from which fraction of its length to which; falling fractions run against its direction.
-        Default: ``[0, 1]``.
+    from_ : 1
+        Along a member: fraction of its length where the way begins.  In Python ``from_``, in files ``from``.
+        Default: ``0``.
+    to : 1
+        Along a member: fraction of its length where it ends; before the beginning where it runs against the member.
+        Default: ``1``.
     discs : whole number, or (n,), 1
-        Straight between holes in a member instead of along it: a number of equal distances in the span, with a hole
-        at its begin and after each, or the fractions of the length at which the holes are.
+        Straight between holes in a member instead of along it: a number of equal distances, with a hole at the
+        beginning and after each, or the fractions of the length at which the holes are.
     """
 
     ground: Vector | None = None
@@ -115,7 +110,8 @@ class Way(Record):
     member: str | None = None
     offset: Annotated[tuple[Quantity, ...], BeforeValidator(_offset)] | None = None
     helix: Coil | None = None
-    span: Annotated[tuple[float, float], BeforeValidator(_span)] | None = None
+    from_: Fraction | None = Field(default=None, alias="from")
+    to: Fraction | None = None
     discs: Annotated[int | tuple[Fraction, ...], BeforeValidator(_discs)] | None = None
 
     @model_validator(mode="after")
@@ -124,25 +120,30 @@ class Way(Record):
         if len(given) != 1:
             found = f"found {' and '.join(given)}, " if given else ""
             raise SceneError(f"{found}accepted: one of 'ground', 'node' and 'member'")
-        useless = {"ground": ("offset", "helix", "span", "discs"), "node": ("helix", "span", "discs"), "member": ()}
+        along = ("helix", "from_", "to", "discs")
+        useless = {"ground": ("offset", *along), "node": along, "member": ()}
         for key in useless[given[0]]:
             if getattr(self, key) is not None:
-                raise SceneError(f"not accepted with a {given[0]}", (key,))
+                raise SceneError(f"not accepted with a {given[0]}", (key.rstrip("_"),))
+        begin, end = self.ends
+        if abs(end - begin) <= tolerances.DECIMAL:
+            raise SceneError(f"found {begin:g} to {end:g}, accepted: two different fractions", ("to",))
         if self.member is not None and self.offset is not None and len(self.offset) > 2:
             raise SceneError("found three numbers, accepted across a member: a number, or [y, z]", ("offset",))
-        varying = any(isinstance(part, (Table, Polynomial)) for part in self.offset or ())
+        varying = any(not isinstance(part, float) for part in self.offset or ())
         if self.node is not None and self.offset is not None and (varying or len(self.offset) == 1):
             raise SceneError("accepted from a node: [x, y] or [x, y, z], numbers", ("offset",))
         if self.helix is not None and self.offset is not None:
             raise SceneError("found the keys 'offset' and 'helix', accepted: one of them")
-        if isinstance(self.discs, tuple) and self.span is not None:
-            raise SceneError("found with fractions of 'discs', accepted: with a number of discs", ("span",))
+        if isinstance(self.discs, tuple) and (self.from_, self.to) != (None, None):
+            key = "from" if self.to is None else "to"
+            raise SceneError("found with fractions of 'discs', accepted: with a number of discs", (key,))
         return self
 
     @property
     def ends(self) -> tuple[float, float]:
         """Fractions of the length of a member from which and to which it goes."""
-        return (0.0, 1.0) if self.span is None else self.span
+        return 0.0 if self.from_ is None else self.from_, 1.0 if self.to is None else self.to
 
     @property
     def holes(self) -> tuple[float, ...]:

@@ -148,13 +148,19 @@ def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
     spans = chosen if isinstance(chosen, Mapping) else dict.fromkeys(chosen)
     for name, span in spans.items():
         _check_asked(name, span)
-        if re.fullmatch(r"members\.[^.]+\.elements|(actuations|magnets)\.[^.]+\.span(\.\d+)?", name):
+        if re.fullmatch(MESHED, name):
             message = "found a number that changes the elements, and with them the unknowns"
             raise SceneError(f"{message}, accepted: one that leaves them as they are", ("arguments", name))
     return [
         _own(scene, name, span) if isinstance(span, Parameter) else argument(scene, name, span)
         for name, span in spans.items()
     ]
+
+
+MESHED = (
+    r"members\.[^.]+\.elements|(actuations|magnets)\.[^.]+\.(from|to)|tendons\.[^.]+\.way\.\d+\.(from|to|discs(\.\d+)?)"
+)
+"""Names of numbers at which elements end."""
 
 
 def _check_asked(name: Any, span: Any) -> None:
