@@ -543,6 +543,11 @@ class CrossSection(Record):
         return self._value("G", x) if self.nu is None else self._value("E", x) / (2.0 * (1.0 + self.nu))
 
     @property
+    def sheared(self) -> bool:
+        """Whether the shear modulus of a shape is known, so that it can shear."""
+        return self.nu is not None or self.G is not None
+
+    @property
     def stretches(self) -> bool:
         """Whether it stretches or shears."""
         return bool(self._given(("EA", "GA2", "GA3")) or self._switched())

@@ -566,7 +566,7 @@ def equilibrium(
         state=state,
         loading=found.loading,
         certificate=certificate,
-        notes=(*notes, *superelement_notes(found.fields), *found.fields.beyond_laws()),
+        notes=(*notes, *superelement_notes(found.fields), *found.fields.beyond_laws(), *strain_notes(found.fields)),
         iterations=iterations,
         strain=found.point.strain,
         potential=found.point.potential,
@@ -593,6 +593,36 @@ def refuse_large(fields: Fields) -> None:
     message = fields.too_large()
     if message:
         raise SolveError(Status.BENT, message)
+
+
+def strain_notes(fields: Fields) -> tuple[str, ...]:
+    """A note where stretch and shear of shapes, which are left out, would change positions by more than the accuracy.
+
+    A member of length L that is pulled by N and pushed across by Q changes its ends by about ``N L / EA + Q L / GA``.
+    """
+    scene, found = fields.model.scene, dict[str, float]()
+    for name in fields.model.members:
+        record = scene.members[name]
+        section = scene.sections[str(record.section)] if record.type == "flexible" else None
+        if section is None or section.shape is None:
+            continue
+        x = fields.model.mesh.cuts[name]
+        left_out = section.replace(stretch=True, shear=section.sheared).compliance(x) - section.compliance(x)
+        strains = fields.section_forces(name, x) * left_out
+        found[name] = float(np.abs(strains).max(axis=0).sum()) * scene.center_lines[name].length / scene.size
+    accuracy = scene.analysis.accuracy
+    worst = max(found, key=lambda name: found[name], default="")
+    if not worst or found[worst] <= LEFT_OUT * accuracy:
+        return ()
+    name = str(scene.members[worst].section)
+    said = f"stretch and shear, which are left out, would move the ends of {worst!r} by about {found[worst]:.1g} of the"
+    asked = f"size, and an accuracy of {accuracy:g} is asked for: stretch = true"
+    more = " and shear = true" if scene.sections[name].sheared else ""
+    return (f"{said} {asked}{more} of the section {name!r} count them",)
+
+
+LEFT_OUT = 3.0
+"""Times the accuracy that stretch and shear may move ends of members, by the estimate, before a note tells it."""
 
 
 def superelement_notes(fields: Fields) -> tuple[str, ...]:

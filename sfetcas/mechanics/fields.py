@@ -174,6 +174,12 @@ class Fields:
             result["strain"] = section.compliance(x) * np.einsum("nij,ni->nj", frames, result["force"])
         return result
 
+    def section_forces(self, member: str, x: Array) -> Array:
+        """Section forces (n, 3), N, along b1, b2, b3 at fractions x (n,) of a flexible or rigid member's length."""
+        found = self._along(member, np.asarray(x, dtype=float))
+        frames = self._frames(member, x, found["rotation"])
+        return np.asarray(np.einsum("nij,ni->nj", frames, found["force"])) * self.model.scales.force
+
     def natural(self, member: str, x: Array) -> Array:
         """Natural twist and curvature (n, 3), 1/m, section axes, that actuations add at fractions x (n,) of a member's
         length.
