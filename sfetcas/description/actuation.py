@@ -130,8 +130,8 @@ class MagneticField(Record):
 
     Examples
     --------
-    >>> MagneticField(type="dipole", position=[0, 0, 0.1], moment=[0, 0, 1]).of([0, 0, 0]).round(9)
-    array([0.    , 0.    , 0.0002])
+    >>> round(float(MagneticField(type="dipole", position=[0, 0, 0.1], moment=[0, 0, 1]).of([0, 0, 0])[2]), 9)
+    0.0002
     """
 
     type: Literal["uniform", "linear", "dipole", "function"] = "uniform"
