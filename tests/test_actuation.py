@@ -710,3 +710,20 @@ def test_rigid_members_have_no_natural_curvature_and_gauss_points_no_magnets():
 def test_where_an_actuation_begins_is_no_parameter(name):
     with pytest.raises(SceneError, match="changes the elements"):
         sfetcas.parametric(actuated(1.0, from_=0.2, to=0.6), [name], ["nodes.B.angle"])
+
+
+@pytest.mark.parametrize("width", [0.01, 0.002])
+def test_a_narrow_profile_is_not_lost(width):
+    """A bump far narrower than the elements that its strip would have without it."""
+    profile = f"exp(-((x-0.3337)/{width})**2)"
+    bump = {"k": {"member": "m", "value": 0.3 / width, "profile": profile}}
+    found = sfetcas.solve(Scene.from_dict({**cantilever((0.0, 0.0)), "loads": {}, "actuations": bump}), accuracy=1e-6)
+    # The accuracy asked for, of an angle.
+    assert found.last.angle("B") == pytest.approx(0.3 * np.sqrt(np.pi), abs=1e-5)
+
+
+@pytest.mark.parametrize("at", [0.5, 0.3333, 0.123456])
+def test_a_dipole_on_a_magnet_is_refused_wherever_it_is(at):
+    scene = {**cantilever((0.0, 0.0)), "magnets": {"k": {"member": "m", "moment_density": [1, 0]}}}
+    with pytest.raises(SceneError, match=r"fields\.u\.position: found a place on the magnet 'k'"):
+        Scene.from_dict({**scene, "fields": {"u": {"type": "dipole", "position": [at, 0], "moment": [1, 0]}}})

@@ -751,6 +751,10 @@ def test_picture():
         ({"way": [{"member": "m", "from": 0.5, "to": 0.5}], "tension": 1.0}, "way.0.to: found 0.5 to 0.5, accepted"),
         ({"way": [{"member": "m", "discs": 0}], "tension": 1.0}, "way.0.discs: found 0, accepted: a number of discs"),
         ({"way": [{"member": "m", "offset": [1, 2, 3]}], "tension": 1.0}, "way.0.offset: found three numbers"),
+        (
+            {"way": [{"member": "m", "offset": ["x", 0]}], "tension": 1.0},
+            "way.0.offset: found the formula 'x', accepted",
+        ),
         ({"way": [{"node": "A", "discs": 3}], "tension": 1.0}, "way.0.discs: not accepted with a node"),
         ({"way": [{"member": "m"}], "tension": 1.0, "history": "h"}, "tendons.t.history: found 'h'"),
     ],
@@ -784,3 +788,18 @@ def test_a_pull_does_not_jump():
 def test_not_with_contacts():
     with pytest.raises(SceneError, match="contacts: found with"):
         rod().replace(contacts={"c": {"type": "plane", "point": [0, -1], "normal": [0, 1], "member": "m"}})
+
+
+@pytest.mark.parametrize("turns", [1, 4, 8, 12])
+def test_what_winds_around_a_member_is_in_space(turns):
+    """However many of its samples lie in the plane."""
+    coil = [{"member": "m", "helix": {"radius": 0.05, "turns": turns}}]
+    assert rod(coil, tension=1.0).resolved_dimension == "space"
+    with pytest.raises(SceneError, match=r"tendons\.t\.way\.0 leaves x-y"):
+        rod(coil, tension=1.0, dimension="plane")
+
+
+def test_a_factor_that_makes_a_string_push_is_told():
+    step = sfetcas.solve(rod(tension=T, analysis={"steps": [-1.0]})).last
+    assert step.notes == ("the tension of 't' is below zero, -3 N: it pushes, as no string does",)
+    assert sfetcas.solve(rod(tension=T)).last.notes == ()

@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.arrays import numbers
+from .formulas import Formula
 from .records import Direction, Fraction, Record, Turn, Vector, listed, number, say
 from .sections import Quantity, Varying, breaks, evaluate
 
@@ -40,7 +41,10 @@ def _kinks(profile: Quantity | None, span: tuple[float, float]) -> tuple[float, 
     return (*span, *(() if profile is None else breaks(profile)))
 
 
-def _check_ends(begin: float, end: float) -> None:
+def _check_along(begin: float, end: float, profile: Quantity | None) -> None:
+    if isinstance(profile, Formula) and profile.uses_length:
+        message = f"found {profile.formula!r}, accepted: a formula of x, the fraction of the length"
+        raise SceneError(message, ("profile",))
     if not end - begin > tolerances.DECIMAL:
         raise SceneError(f"found {begin:g} to {end:g}, accepted: an end after the beginning", ("to",))
 
@@ -81,7 +85,7 @@ class Actuation(Record):
 
     @model_validator(mode="after")
     def _check(self) -> Actuation:
-        _check_ends(*self.span)
+        _check_along(*self.span, self.profile)
         return self
 
     @property
@@ -277,7 +281,7 @@ class Magnet(Record):
         for key in (other, *(("from_", "to", "profile") if self.member is None else ())):
             if key in self.model_fields_set and getattr(self, key) is not None:
                 raise SceneError(f"not accepted: the magnet is {where}", (key.rstrip("_"),))
-        _check_ends(*self.span)
+        _check_along(*self.span, self.profile)
         return self
 
     @property

@@ -206,7 +206,8 @@ def _magnets(magnets: Mapping[str, Magnet], lines: Mapping[str, CenterLine]) -> 
 def _tendons(tendons: Mapping[str, Tendon], lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
     for name, tendon in tendons.items():
         for i, way in enumerate(tendon.way):
-            if any(_leaves(arm) for arm in _arms(way, lines)):
+            winds = way.helix is not None and way.helix.turns != 0.0
+            if winds or any(_leaves(arm) for arm in _arms(way, lines)):
                 yield ("tendons", name, "way", str(i)), "leaves x-y"
 
 

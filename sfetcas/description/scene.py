@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, model_validator
 
 from .. import tolerances
@@ -617,15 +618,26 @@ def _check_actuated(scene: Scene) -> None:
 
 def _check_apart(scene: Scene, name: str, magnet: Magnet) -> None:
     """Refuse the field of a dipole at its own place, where it has no bounds."""
-    if magnet.member is None:
-        places = np.array([scene.nodes[str(magnet.node)].position])
-    else:
-        places = scene.center_lines[magnet.member].positions(np.linspace(*magnet.span, 257))
     for field in (field for field in scene.fields if scene.fields[field].type == "dipole"):
-        apart = np.linalg.norm(places - np.array(scene.fields[field].position), axis=1).min()
+        place = np.array(scene.fields[field].position)
+        if magnet.member is None:
+            apart = float(np.linalg.norm(np.array(scene.nodes[str(magnet.node)].position) - place))
+        else:
+            apart = _distance(scene.center_lines[magnet.member], magnet.span, place)
         if apart < tolerances.WRITTEN * scene.size:
             message = f"found a place on the magnet {name!r}, where the field has no bounds, accepted: one beside it"
             raise SceneError(message, ("fields", field, "position"))
+
+
+def _distance(line: CenterLine, span: tuple[float, float], place: NDArray[np.float64]) -> float:
+    """Distance, m, of a place from a part of a centre line: from samples, then again and again from those beside."""
+    low, high = span
+    for _ in range(8):
+        x = np.linspace(low, high, 65)
+        apart = np.linalg.norm(line.positions(x) - place, axis=1)
+        nearest = int(np.argmin(apart))
+        low, high = x[max(nearest - 1, 0)], x[min(nearest + 1, 64)]
+    return float(apart[nearest])
 
 
 def _check_springs(scene: Scene) -> None:

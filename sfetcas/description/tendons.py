@@ -15,6 +15,7 @@ from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.arrays import Array, numbers, values_of
 from ..mathematics.quaternion import matrix
+from .formulas import Formula
 from .records import Fraction, NotNegative, Number, Positive, Record, Vector, listed, number, say, unknown, whole
 from .sections import Polynomial, Quantity, Table, breaks, evaluate, quantity
 from .shapes import CenterLine
@@ -91,7 +92,7 @@ class Way(Record):
         A way along a flexible or rigid member, or holes in it.
     offset : (3,) from a node, fixed axes of the undeformed scene; or [y, z] across a member, along b2 and b3; m
         From the node, with which it turns, or from the centre line of the member.  Along a member one number is an
-        offset along b2, and each may be a varying quantity.  Default: zero.
+        offset along b2, and each may vary, as a table or a polynomial.  Default: zero.
     helix : table
         Instead of an offset along a member: the table ``radius``, ``turns``, ``phase``.
     from_ : 1
@@ -120,6 +121,10 @@ class Way(Record):
         if len(given) != 1:
             found = f"found {' and '.join(given)}, " if given else ""
             raise SceneError(f"{found}accepted: one of 'ground', 'node' and 'member'")
+        for part in self.offset or ():
+            if isinstance(part, Formula):
+                accepted = "numbers, {at = [..], value = [..]} or {polynomial = [..]}"
+                raise SceneError(f"found the formula {part.formula!r}, accepted: {accepted}", ("offset",))
         along = ("helix", "from_", "to", "discs")
         useless = {"ground": ("offset", *along), "node": along, "member": ()}
         for key in useless[given[0]]:

@@ -152,4 +152,12 @@ def _where(equations: Equations, unknowns: Array) -> list[str]:
     members = [name for name in scene.members if turning & set(along.get(name, model.rotations.ends[name]))]
     y, axes = model.positions.Y, model.element.axes
     moving = np.unique(y.row[np.isin(equations.rotation_unknowns + y.column, unknowns)] // axes)
-    return [*members, *(model.segments.places[i] for i in moving)]
+    # Strains stand for their member.
+    owners = {
+        model.segments.places[i]: part.member
+        for part in model.segments.parts
+        for i in model.segments.strains[part.elements].ravel().tolist()
+        if i >= 0
+    }
+    places = [model.segments.places[i] for i in moving]
+    return list(dict.fromkeys([*members, *(owners.get(name, name) for name in places)]))

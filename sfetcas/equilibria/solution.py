@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import os
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -566,7 +566,7 @@ def equilibrium(
         state=state,
         loading=found.loading,
         certificate=certificate,
-        notes=(*notes, *superelement_notes(found.fields), *found.fields.beyond_laws(), *strain_notes(found.fields)),
+        notes=(*notes, *_notes(found.fields)),
         iterations=iterations,
         strain=found.point.strain,
         potential=found.point.potential,
@@ -595,6 +595,14 @@ def refuse_large(fields: Fields) -> None:
         raise SolveError(Status.BENT, message)
 
 
+def _notes(fields: Fields) -> Iterator[str]:
+    """Notes on what the model leaves out, or is beyond its validity."""
+    yield from superelement_notes(fields)
+    yield from fields.beyond_laws()
+    yield from strain_notes(fields)
+    yield from tendon_notes(fields)
+
+
 def strain_notes(fields: Fields) -> tuple[str, ...]:
     """A note where stretch and shear of shapes, which are left out, would change positions by more than the accuracy.
 
@@ -619,6 +627,18 @@ def strain_notes(fields: Fields) -> tuple[str, ...]:
     asked = f"size, and an accuracy of {accuracy:g} is asked for: stretch = true"
     more = " and shear = true" if scene.sections[name].sheared else ""
     return (f"{said} {asked}{more} of the section {name!r} count them",)
+
+
+def tendon_notes(fields: Fields) -> tuple[str, ...]:
+    """Notes on tendons whose tension, and chambers whose pressure, a factor makes negative."""
+    notes = []
+    for name, tendon in fields.model.scene.tendons.items():
+        tension = 0.0 if tendon.measured else float(fields.tendon(name)["tension"])
+        if tendon.tension is not None and tension < 0.0:
+            notes.append(f"the tension of {name!r} is below zero, {tension:.3g} N: it pushes, as no string does")
+        elif tendon.pressure is not None and tension > 0.0:
+            notes.append(f"the pressure of {name!r} is below zero: it pulls by {tension:.3g} N")
+    return tuple(notes)
 
 
 LEFT_OUT = 3.0

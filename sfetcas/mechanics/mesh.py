@@ -257,8 +257,10 @@ elements that are much shorter than those beside them are slivers."""
 
 
 def _formulas(scene: Scene, member: str) -> list[Formula]:
-    """Formulas of the section of a member and of the loads along it."""
+    """Formulas of the section of a member and of what acts along it."""
     loads = [load.profile for load in scene.loads.values() if load.member == member]
+    loads += [one.profile for one in scene.actuations.values() if one.member == member]
+    loads += [one.profile for one in scene.magnets.values() if one.member == member]
     section = scene.sections.get(str(scene.members[member].section))
     return [one for one in (*loads, *(section.varying if section else ())) if isinstance(one, Formula)]
 
