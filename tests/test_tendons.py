@@ -9,7 +9,8 @@ from scipy.optimize import root
 from test_codegen import built, needs_compiler, said
 
 import sfetcas
-from sfetcas import Scene, SceneError
+from sfetcas import Scene, SceneError, SolveError
+from sfetcas.equilibria import stops
 from sfetcas.mathematics import quaternion
 from sfetcas.solvers.globalised import Code
 
@@ -99,6 +100,13 @@ def test_slack(pull):
     assert step.tendon("t")["tension"] < 0.0
     assert "slack" not in step.tendon("t")
     assert step.position("B")[1] < -0.05
+
+
+def test_what_is_not_settled_is_named(monkeypatch):
+    """A search that comes back to a choice it has tried names all whose state changed, not only those of the last."""
+    monkeypatch.setattr(stops, "_next_stops", lambda answer, now: () if now else (("t", "slack"),))
+    with pytest.raises(SolveError, match=r"no choice of stops and slack tendons holds: tendons\.t\b"):
+        sfetcas.solve(rod(pull=0.01))
 
 
 def test_antagonists():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,25 +31,40 @@ def _gradient(value: Any) -> tuple[tuple[float, ...], ...]:
 Gradient = Annotated[tuple[tuple[float, ...], ...], BeforeValidator(_gradient)]
 
 
-def _profile(profile: Quantity | None, x: ArrayLike) -> NDArray[np.float64]:
-    """Values (n,) of a profile at fractions x (n,) of the length; one without a profile."""
-    return evaluate(1.0 if profile is None else profile, x)
+class _AlongMember:
+    """What acts on a part of a member, from ``from_`` to ``to``, and may vary along it by a profile."""
+
+    if TYPE_CHECKING:  # fields of the records that follow, which say where in their order they stand
+        from_: float
+        to: float
+        profile: Quantity | None
+
+        @property
+        def vector(self) -> tuple[float, float, float]: ...
+
+    def _check_along(self) -> None:
+        if isinstance(self.profile, Formula) and self.profile.uses_length:
+            message = f"found {self.profile.formula!r}, accepted: a formula of x, the fraction of the length"
+            raise SceneError(message, ("profile",))
+        if not self.to - self.from_ > tolerances.DECIMAL:
+            raise SceneError(f"found {self.from_:g} to {self.to:g}, accepted: an end after the beginning", ("to",))
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Fractions (2,) of the length of the member where it begins and ends."""
+        return self.from_, self.to
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Fractions of the length at which it begins, ends, or has a kink."""
+        return (*self.span, *(() if self.profile is None else breaks(self.profile)))
+
+    def along(self, x: ArrayLike) -> NDArray[np.float64]:
+        """The vector times the profile (n, 3), section axes, at fractions x (n,) of the length, on the whole member."""
+        return evaluate(1.0 if self.profile is None else self.profile, x)[:, None] * numbers(self.vector)
 
 
-def _kinks(profile: Quantity | None, span: tuple[float, float]) -> tuple[float, ...]:
-    """Fractions of the length at which what has a profile and a span begins, ends, or has a kink."""
-    return (*span, *(() if profile is None else breaks(profile)))
-
-
-def _check_along(begin: float, end: float, profile: Quantity | None) -> None:
-    if isinstance(profile, Formula) and profile.uses_length:
-        message = f"found {profile.formula!r}, accepted: a formula of x, the fraction of the length"
-        raise SceneError(message, ("profile",))
-    if not end - begin > tolerances.DECIMAL:
-        raise SceneError(f"found {begin:g} to {end:g}, accepted: an end after the beginning", ("to",))
-
-
-class Actuation(Record):
+class Actuation(_AlongMember, Record):
     """Natural curvature and twist of a member, added to what its shape has.
 
     The member is free of moments where it is bent and twisted by just as much.  Chambers under pressure, heat, swelling
@@ -85,27 +100,13 @@ class Actuation(Record):
 
     @model_validator(mode="after")
     def _check(self) -> Actuation:
-        _check_along(*self.span, self.profile)
+        self._check_along()
         return self
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """Fractions (2,) of the length where it begins and ends."""
-        return self.from_, self.to
 
     @property
     def vector(self) -> tuple[float, float, float]:
         """The value with three components (3,), 1/m, about b1, b2, b3; a single number is the curvature about b3."""
         return self.value if isinstance(self.value, tuple) else (0.0, 0.0, self.value)
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """Fractions of the length at which it begins, ends, or has a kink."""
-        return _kinks(self.profile, self.span)
-
-    def along(self, x: ArrayLike) -> NDArray[np.float64]:
-        """Natural twist and curvature (n, 3), 1/m, section axes, at fractions x (n,) of the length, without span."""
-        return _profile(self.profile, x)[:, None] * numbers(self.vector)
 
 
 class MagneticField(Record):
@@ -240,7 +241,7 @@ PERMEABILITY = 1e-7
 """Magnetic constant over 4 pi, T m/A."""
 
 
-class Magnet(Record):
+class Magnet(_AlongMember, Record):
     """A magnetised member, or a magnetic dipole at a node; it turns with what carries it.
 
     Parameters
@@ -281,13 +282,8 @@ class Magnet(Record):
         for key in (other, *(("from_", "to", "profile") if self.member is None else ())):
             if key in self.model_fields_set and getattr(self, key) is not None:
                 raise SceneError(f"not accepted: the magnet is {where}", (key.rstrip("_"),))
-        _check_along(*self.span, self.profile)
+        self._check_along()
         return self
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """Fractions (2,) of the length of a member between which it is magnetised."""
-        return self.from_, self.to
 
     @property
     def vector(self) -> tuple[float, float, float]:
@@ -295,12 +291,3 @@ class Magnet(Record):
         found = self.moment if self.member is None else self.moment_density
         assert found is not None
         return found
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """Fractions of the length at which it begins, ends, or has a kink."""
-        return _kinks(self.profile, self.span)
-
-    def along(self, x: ArrayLike) -> NDArray[np.float64]:
-        """Moment per length (n, 3), A m, section axes, at fractions x (n,) of the length, without span."""
-        return _profile(self.profile, x)[:, None] * numbers(self.vector)

@@ -448,7 +448,7 @@ class CrossSection(Record):
 
     def _check_shape(self, shape: str) -> None:
         needed = _OUTLINES[shape][0]
-        if self.shear and self.nu is None and self.G is None:
+        if self.shear and not self.sheared:
             raise SceneError("the key 'G' is missing, shear = true needs it or nu")
         if self.shear_factor is not None and not self.shear:
             raise SceneError("found 'shear_factor' without shear = true, accepted: both or neither")
@@ -509,7 +509,7 @@ class CrossSection(Record):
             known = set(self._given(_NUMBERS)) | {"rhoI"}
         else:
             known = {"EI2", "EI3"}
-            known |= {"GJ"} if self._given(("nu", "G")) else set()
+            known |= {"GJ"} if self.sheared else set()
             known |= {"rhoA", "rhoI"} if self.rho is not None else set()
         known |= set(self.law.gives) if self.law is not None else set()
         return [name for name in names if name not in known]

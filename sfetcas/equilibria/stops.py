@@ -58,7 +58,7 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
 def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops) -> tuple[Solution, Stops]:
     """The answer of one factor, from the stops that the factor before it reached."""
     alone = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"steps": (factor,)})})
-    tried = set()
+    tried: set[Stops] = set()
     while stops not in tried:
         tried.add(stops)
         found = solve(alone, settings, stops=stops)
@@ -66,7 +66,8 @@ def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops) -> 
         if change == stops:
             return found, stops
         stops = change
-    names = ", ".join(f"{'tendons' if side == 'slack' else 'springs'}.{name}" for name, side in stops)
+    doubtful = sorted({stop for choice in tried for stop in choice})
+    names = ", ".join(f"{'tendons' if side == 'slack' else 'springs'}.{name}" for name, side in doubtful)
     raise SolveError(Status.FAILED, f"no choice of stops and slack tendons holds: {names}")
 
 
