@@ -14,7 +14,7 @@ from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.arrays import numbers
 from .formulas import Formula
-from .records import Direction, Fraction, Record, Turn, Vector, listed, number, say
+from .records import Direction, Fraction, OnPart, Record, Turn, Vector, listed, number, say
 from .sections import Quantity, Varying, breaks, evaluate
 
 __all__ = ["ANYWHERE", "PERMEABILITY", "Actuation", "Magnet", "MagneticField"]
@@ -31,12 +31,10 @@ def _gradient(value: Any) -> tuple[tuple[float, ...], ...]:
 Gradient = Annotated[tuple[tuple[float, ...], ...], BeforeValidator(_gradient)]
 
 
-class _AlongMember:
-    """What acts on a part of a member, from ``from_`` to ``to``, and may vary along it by a profile."""
+class _AlongMember(OnPart):
+    """What acts on a part of a member, and may vary along it by a profile."""
 
-    if TYPE_CHECKING:  # fields of the records that follow, which say where in their order they stand
-        from_: float
-        to: float
+    if TYPE_CHECKING:  # a field of the records that follow, which say where in their order it stands
         profile: Quantity | None
 
         @property
@@ -46,18 +44,12 @@ class _AlongMember:
         if isinstance(self.profile, Formula) and self.profile.uses_length:
             message = f"found {self.profile.formula!r}, accepted: a formula of x, the fraction of the length"
             raise SceneError(message, ("profile",))
-        if not self.to - self.from_ > tolerances.DECIMAL:
-            raise SceneError(f"found {self.from_:g} to {self.to:g}, accepted: an end after the beginning", ("to",))
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """Fractions (2,) of the length of the member where it begins and ends."""
-        return self.from_, self.to
+        self._check_part()
 
     @property
     def breaks(self) -> tuple[float, ...]:
         """Fractions of the length at which it begins, ends, or has a kink."""
-        return (*self.span, *(() if self.profile is None else breaks(self.profile)))
+        return (*self.part, *(() if self.profile is None else breaks(self.profile)))
 
     def along(self, x: ArrayLike) -> NDArray[np.float64]:
         """The vector times the profile (n, 3), section axes, at fractions x (n,) of the length, on the whole member."""

@@ -18,7 +18,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import TINY, Array
 from ..mathematics.interpolation import cubic_spline, fitted_spline
 from .columns import read_columns
-from .records import Fraction, Numbers, Record, Turn, Vector, number, say
+from .records import Fraction, Numbers, OnPart, Record, Turn, Vector, number, say
 from .sections import Varying
 
 __all__ = ["History", "Load", "Motion"]
@@ -322,7 +322,7 @@ SMOOTH = 1e-6
 """Jumps over the largest value, of derivatives times the interval's length, up to which a history goes on smoothly."""
 
 
-class Load(Record):
+class Load(OnPart, Record):
     """A force, a moment or a distributed force.
 
     Parameters
@@ -397,17 +397,7 @@ class Load(Record):
         if self.at is not None:
             accepted = "accepted: 'from' and 'to', between which a distributed load acts"
             raise SceneError(f"found {self.at:g}, {accepted}", ("at",))
-        if not self.to - self.from_ > tolerances.DECIMAL:
-            raise SceneError(f"found {self.from_:g} to {self.to:g}, accepted: an end after the beginning", ("to",))
-
-    @property
-    def part(self) -> tuple[float, float]:
-        """Where a distributed load begins and ends, fractions (2,) of the length of its member."""
-        return self.from_, self.to
-
-    def inside(self, x: Array) -> Array:
-        """Whether fractions x (any shape) of the length of its member are where a distributed load acts."""
-        return (x > self.from_) & (x < self.to)
+        self._check_part()
 
     @property
     def follows(self) -> bool:

@@ -8,12 +8,14 @@ import operator
 import re
 from collections.abc import Iterable, Mapping, Sequence, Set
 from types import MappingProxyType
-from typing import Annotated, Any, NoReturn, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
+from .. import tolerances
 from ..errors import SceneError
+from ..mathematics.arrays import Array
 from .described import Described
 
 __all__ = [
@@ -23,6 +25,7 @@ __all__ = [
     "NotNegative",
     "Number",
     "Numbers",
+    "OnPart",
     "Positive",
     "Record",
     "Turn",
@@ -346,6 +349,27 @@ def plain(value: Any) -> Any:
 def _is_default(value: Any, field: FieldInfo) -> bool:
     default = field.get_default(call_default_factory=True, validated_data={})
     return bool(value is default or plain(value) == plain(default))
+
+
+class OnPart:
+    """What acts on a part of a member, from ``from_`` to ``to``."""
+
+    if TYPE_CHECKING:  # fields of the records that follow, which say where in their order they stand
+        from_: float
+        to: float
+
+    def _check_part(self) -> None:
+        if not self.to - self.from_ > tolerances.DECIMAL:
+            raise SceneError(f"found {self.from_:g} to {self.to:g}, accepted: an end after the beginning", ("to",))
+
+    @property
+    def part(self) -> tuple[float, float]:
+        """Fractions (2,) of the length of the member where it begins and ends."""
+        return self.from_, self.to
+
+    def inside(self, x: Array) -> Array:
+        """Whether fractions x (any shape) of the length of the member lie where it acts."""
+        return (x > self.from_) & (x < self.to)
 
 
 def _restore(record: type[Record], values: dict[str, Any]) -> Record:

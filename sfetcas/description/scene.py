@@ -623,7 +623,7 @@ def _check_apart(scene: Scene, name: str, magnet: Magnet) -> None:
         if magnet.member is None:
             apart = float(np.linalg.norm(np.array(scene.nodes[str(magnet.node)].position) - place))
         else:
-            apart = _distance(scene.center_lines[magnet.member], magnet.span, place)
+            apart = _distance(scene.center_lines[magnet.member], magnet.part, place)
         if apart < tolerances.WRITTEN * scene.size:
             message = f"found a place on the magnet {name!r}, where the field has no bounds, accepted: one beside it"
             raise SceneError(message, ("fields", field, "position"))

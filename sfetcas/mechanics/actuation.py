@@ -25,7 +25,7 @@ from .elements import Element
 from .parts import Parts
 from .terms import Discrete, One, Side, Term
 
-__all__ = ["NaturalCurvature", "actuations_in", "inside", "points_of"]
+__all__ = ["NaturalCurvature", "actuations_in", "points_of"]
 
 
 @final
@@ -98,13 +98,6 @@ def points_of(parts: Parts, member: str) -> Array:
     return numbers(cuts[:-1, None] + np.diff(cuts)[:, None] * parts.element.points)
 
 
-def inside(parts: Parts, member: str, span: tuple[float, float]) -> Array:
-    """Which elements of a member (elements,) lie in a part of it, at whose ends elements end."""
-    cuts = parts.mesh.cuts[member]
-    middle = 0.5 * (cuts[1:] + cuts[:-1])
-    return np.asarray((middle > span[0]) & (middle < span[1]))
-
-
 def actuations_in(parts: Parts) -> Iterator[One]:
     """One term for each element with natural curvature or twist, whatever gives it."""
     scene, element, turns = parts.scene, parts.element, parts.element.turns
@@ -117,7 +110,7 @@ def actuations_in(parts: Parts) -> Iterator[One]:
                 continue
             natural = quaternion.rotate(frames, actuation.along(x.ravel()))[:, 3 - turns :] * parts.scales.length
             natural = natural.reshape(len(x), -1)
-            for e in np.flatnonzero(inside(parts, member, actuation.span)).tolist():
+            for e in np.flatnonzero(actuation.inside(x.mean(axis=1))).tolist():
                 key = e, actuation.history
                 found[key] = found[key] + natural[e] if key in found else natural[e]
         for e in sorted({e for e, _ in found}):

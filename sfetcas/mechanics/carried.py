@@ -181,7 +181,7 @@ def natural_turning(scene: Scene, member: str) -> float:
     found = 0.0
     for actuation in scene.actuations.values():
         if actuation.member == member:
-            low, high = actuation.span
+            low, high = actuation.part
             most = np.linalg.norm(actuation.along(np.linspace(low, high, 9)), axis=1).max()
             found += float(most) * (high - low) * scene.center_lines[member].length
     return found

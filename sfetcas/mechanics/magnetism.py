@@ -22,7 +22,7 @@ from ..description.actuation import ANYWHERE, PERMEABILITY, Magnet, MagneticFiel
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers
-from .actuation import inside, points_of
+from .actuation import points_of
 from .elements import Element
 from .parts import Parts
 from .terms import Discrete, Group, One, Side, Term
@@ -321,7 +321,7 @@ def _along_member(
     density = quaternion.rotate(frames, magnet.along(x.ravel()))[:, :axes].reshape(*x.shape, axes)
     places = (line.positions(x.ravel())[:, :axes] - position).reshape(*x.shape, axes) / parts.scales.length
     kind, lines = Magnetised(element.space, law, element), parts.beams.flat("tangent", "compliance")
-    for e in np.flatnonzero(inside(parts, member, magnet.span)).tolist():
+    for e in np.flatnonzero(magnet.inside(x.mean(axis=1))).tolist():
         number = first + e
         weight = parts.beams.weight[number][:, None] * (parts.scales.length / parts.scales.moment)
         data, starts = [(density[e] * weight).ravel()], tuple[int, ...]()

@@ -460,7 +460,7 @@ def _sketch_distributed(sketch: Sketch, name: str, load: Load, value: Array) -> 
 
 def _sketch_actuation(sketch: Sketch, name: str, actuation: Actuation) -> None:
     """A line on the side to which natural curvature bends a member, and an arrow about its axis where it is twisted."""
-    x = np.linspace(*actuation.span, 33)
+    x = np.linspace(*actuation.part, 33)
     natural = sketch.factor(actuation.history) * actuation.along(x)
     peak = int(np.linalg.norm(natural, axis=1).argmax())
     if not natural[peak].any():
@@ -492,7 +492,7 @@ def _magnet_at(sketch: Sketch, magnet: Magnet) -> tuple[Array, Array]:
         turned = sketch.step.quaternion(magnet.node)
         moments = np.array(magnet.vector) if turned is None else quaternion.rotate(turned, np.array(magnet.vector))
         return sketch.at(magnet.node)[None, :], moments[None, :] / norm(moments)
-    member, (low, high) = str(magnet.member), magnet.span
+    member, (low, high) = str(magnet.member), magnet.part
     x = low + (high - low) * (np.arange(MAGNETS) + 0.5) / MAGNETS
     turned = sketch.step.along(member, x)["quaternion"]
     frames = quaternion.multiply(turned, sketch.scene.center_lines[member].quaternions(x))
