@@ -141,10 +141,13 @@ def stretched(equations: Equations, point: Point, loose: Array | None = None) ->
         sizes = np.linalg.norm(changed_by(equations, point, nearly), axis=0)
         growing = np.abs(nearly.T @ point.residual[equations.unknowns :]) > GROWING * sizes**2
         loose = nearly if growing.any() else nearly[:, :0]
-    return FULLY + named_in(equations, loose) if loose.size else ""
+    if not loose.size:
+        return ""
+    strings = ", the stiffness of a tendon too" if equations.model.scene.tendons else ""
+    return f"{FULLY} (EA lets it stretch{strings}): {named_in(equations, loose)}"
 
 
-FULLY = "fully stretched between held points, where an inextensible member takes any force (EA lets it stretch): "
+FULLY = "fully stretched between held points, where an inextensible member takes any force"
 
 NEARLY = 1e-3
 """Singular values of nearly redundant rows, share of the largest: members may be about to become straight."""
