@@ -147,7 +147,7 @@ def test_polynomials_above_zero_are_taken(value):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({}, "found nothing in it, accepted: EI2, EI3, GJ, EA, GA2, GA3, rhoA, rhoI or a shape"),
+        ({}, "found nothing in it, accepted: EI2, EI3, GJ, EA, GA2, GA3, stiffness, rhoA, rhoI or a shape"),
         ({"EI": 1}, "unknown key 'EI'; did you mean 'EI3'"),
         ({"rhoI": 1}, "rhoI: found 1, accepted: three numbers, about b1, b2 and b3"),
         ({"rhoI": [1, 2]}, "rhoI: found 2 numbers, accepted: three"),

@@ -495,7 +495,7 @@ def test_sections_carry_what_their_strains_ask_for(dimension):
     # Derivatives of rotations lose three of the digits of the positions.
     np.testing.assert_allclose(told["curvature"][:, axes], changes[:, axes], atol=1e-6)
     model = found.model
-    gained = gained_tangents(model, found.state.y) / model.beams.weight[..., None]
+    gained = gained_tangents(model, found.state) / model.beams.weight[..., None]
     at = Stations(model.element, model.mesh.cuts["m"], x)
     strains = np.einsum("np,npa->na", at.at_points, gained[at.elements])
     np.testing.assert_allclose(told["strain"][:, : strains.shape[1]], strains, atol=1e-6)

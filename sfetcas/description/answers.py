@@ -187,7 +187,7 @@ APPLIES: dict[str, Callable[[Any, Any], bool]] = {
     "members.NAME.angle": _in_plane,
     "reactions.NAME.force": _supported,
     "reactions.NAME.moment": _supported,
-    "members.NAME.strain": lambda scene, member: member.stretches(scene.sections),
+    "members.NAME.strain": lambda scene, member: member.stretches(scene.sections) or member.shifted(scene.sections),
     "members.NAME.bending_strain": outlined,
     "members.NAME.bending_stress": outlined,
     "members.NAME.largest_bending_strain": outlined,

@@ -100,11 +100,9 @@ def _sections(
         section = None if member.section is None else sections.get(member.section)
         if section is None or member.type == "rigid" or not lines[name].planar:
             continue
-        if section.couples(lines[name].bending_axis):
-            yield (
-                ("sections", str(member.section), "coupling"),
-                "couples bending in x-y with twist or bending out of it",
-            )
+        leaves = section.leaves(lines[name].bending_axis)
+        if leaves is not None:
+            yield ("sections", str(member.section), leaves[0]), leaves[1]
 
 
 def _spins(members: Mapping[str, Member]) -> Iterator[Finding]:

@@ -275,6 +275,11 @@ class Scene(Record):
         """Whether any member stretches or shears."""
         return any(member.stretches(self.sections) for member in self.members.values())
 
+    @cached_property
+    def shifted(self) -> bool:
+        """Whether the section of any flexible member couples forces with moments."""
+        return any(member.shifted(self.sections) for member in self.members.values())
+
     @property
     def resolved_dimension(self) -> Literal["plane", "space"]:
         """How the scene is modelled: plane or space."""
@@ -432,6 +437,12 @@ def _check_tendons(scene: Scene) -> None:
         for way in tendon.way:
             section = None if way.member is None else scene.members[way.member].section
             law = None if section is None else scene.sections[section].law
+            if way.member is not None and not way.holes and scene.members[way.member].shifted(scene.sections):
+                off = scene.members[way.member].off_line(scene.sections)
+                message = (
+                    f"found the member {way.member!r}, whose section has {off}, accepted: discs, or a member without"
+                )
+                raise SceneError(message, ("tendons", name))
             if law is not None and not way.holes:
                 found = f"found the member {way.member!r}, whose section has the law {law.type!r}"
                 raise SceneError(f"{found}, accepted: discs, or a member without a law", ("tendons", name))
@@ -555,6 +566,21 @@ def _needed(scene: Scene, member: str) -> tuple[str, ...]:
     return (*needed, "rhoA") if _massive(scene) else needed
 
 
+def _check_off_line(scene: Scene) -> None:
+    """Refuse centres off the line of members that are not flexible."""
+    for name, member in scene.members.items():
+        section = None if member.section is None else scene.sections[member.section]
+        if section is None or member.type == "flexible":
+            continue
+        key = section.off_line if member.type == "small" else section.mass_center and "mass_center"
+        if key:
+            message = (
+                f"found the {member.type} member {name!r}, whose section {member.section!r} has {key!r}, accepted:"
+            )
+            more = " flexible members" if member.type == "small" else " its mass at nodes, or a flexible member"
+            raise SceneError(message + more, ("members", name))
+
+
 def _check_bodies(scene: Scene) -> None:
     for name, member in scene.members.items():
         if member.stiffness is None:
@@ -593,6 +619,10 @@ def _check_actuated(scene: Scene) -> None:
         kind = scene.members[actuation.member].type
         if kind != "flexible":
             message = f"found the {kind} member {actuation.member!r}, accepted: a flexible one, which bends"
+            raise SceneError(message, ("actuations", name, "member"))
+        if scene.members[actuation.member].shifted(scene.sections):
+            off = scene.members[actuation.member].off_line(scene.sections)
+            message = f"found the member {actuation.member!r}, whose section has {off}, accepted: one without"
             raise SceneError(message, ("actuations", name, "member"))
         law = scene.sections[str(scene.members[actuation.member].section)].law
         if law is not None:
@@ -745,6 +775,10 @@ def _check_contacts(scene: Scene) -> None:
                     ("contacts", name),
                 )
             _check_stretching_contact(scene, name, member)
+            off = scene.members[member].off_line(scene.sections)
+            if off:
+                message = f"found the member {member!r}, whose section has {off}, accepted: members without touch"
+                raise SceneError(f"{message} obstacles", ("contacts", name))
             law = scene.sections[str(scene.members[member].section)].law if scene.members[member].section else None
             if law is not None:
                 message = f"found the member {member!r}, whose section has the law {law.type!r}"
@@ -847,6 +881,7 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_sections,
     _check_releases,
     _check_bodies,
+    _check_off_line,
     _check_loads,
     _check_actuated,
     _check_springs,

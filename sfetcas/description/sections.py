@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, final
 import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
-from pydantic import AfterValidator, BeforeValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
@@ -22,6 +22,7 @@ from .records import NotNegative, Number, Numbers, Record, number, say
 __all__ = [
     "FINE",
     "HEAVY",
+    "OFF_LINE",
     "CrossSection",
     "Polynomial",
     "Quantity",
@@ -207,6 +208,49 @@ def _three(value: Any) -> tuple[Any, ...]:
     return entries
 
 
+def _center(value: Any) -> tuple[Any, ...]:
+    if isinstance(value, (str, Mapping)) or not isinstance(value, Iterable):
+        raise ValueError(f"found {say(value)}, accepted: two numbers, along b2 and b3")
+    entries = tuple(value)
+    if len(entries) != 2:
+        raise ValueError(f"found {len(entries)} numbers, accepted: two, along b2 and b3")
+    return entries
+
+
+def _matrix(value: Any) -> tuple[tuple[Any, ...], ...]:
+    """Rows of a stiffness matrix, of which a table has one at each of its fractions."""
+    accepted = "six rows of six entries, for N, Q2, Q3, M1, M2, M3"
+    if isinstance(value, Mapping):
+        if set(value) != {"at", "value"} or not isinstance(value["value"], Iterable):
+            raise ValueError(f"found {say(value)}, accepted: {accepted}, or {{at = [..], value = [matrices]}}")
+        matrices = [_matrix(each) for each in value["value"]]
+        return tuple(tuple(_entry(value["at"], [m[i][j] for m in matrices]) for j in range(6)) for i in range(6))
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise ValueError(f"found {say(value)}, accepted: {accepted}")
+    rows = tuple(value)
+    for row in rows:
+        if isinstance(row, (str, Mapping)) or not isinstance(row, Iterable):
+            raise ValueError(f"found {say(row)} for a row, accepted: {accepted}")
+    found = tuple(tuple(row) for row in rows)
+    if len(found) != 6 or any(len(row) != 6 for row in found):
+        lengths = ", ".join(str(len(row)) for row in found)
+        raise ValueError(f"found {len(found)} rows of {lengths or 'no'} entries, accepted: {accepted}")
+    return found
+
+
+def _entry(at: Any, values: list[Any]) -> Any:
+    """An entry of matrices at fractions of the length: a number where it is the same in all of them."""
+    same = all(isinstance(one, (int, float)) and one == values[0] for one in values)
+    return values[0] if same and len(values) > 1 else {"at": at, "value": values}
+
+
+def _inverse(matrices: Floats) -> Floats:
+    """Inverses of symmetric matrices (n, 3, 3), also of symbols."""
+    a, b, c = (matrices[:, i] for i in range(3))
+    columns = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
+    return numbers(columns / np.einsum("ni,ni->n", a, np.cross(b, c))[:, None, None])
+
+
 def _poisson(value: float) -> float:
     if not -1.0 < value <= 0.5:
         raise ValueError(f"found {value:g}, accepted: a number above -1 and up to 0.5")
@@ -221,6 +265,18 @@ def _share(value: float) -> float:
 
 Above = Annotated[Varying, AfterValidator(_above_zero)]
 Inertia = Annotated[Varying, AfterValidator(_not_negative)]
+
+Row = tuple[Varying, Varying, Varying, Varying, Varying, Varying]
+Matrix = Annotated[tuple[Row, Row, Row, Row, Row, Row], BeforeValidator(_matrix)]
+Center = Annotated[tuple[Varying, Varying], BeforeValidator(_center)]
+
+OFF_LINE = {
+    "stiffness": "a stiffness matrix that couples forces with moments",
+    "tension_center": "a tension centre off the line",
+    "shear_center": "a shear centre off the line",
+    "mass_center": "a mass centre off the line",
+}
+"""Keys of what is off the line of a member, in words."""
 
 HEAVY = np.linspace(0.0, 1.0, SAMPLES)
 """Fractions of the length at which a mass is looked for."""
@@ -274,7 +330,9 @@ _OUTLINES: dict[str, tuple[tuple[str, ...], Outline]] = {
     "circle": (("radius",), _circle),
     "tube": (("outer", "inner"), _tube),
 }
-_NUMBERS = ("EI2", "EI3", "GJ", "EA", "GA2", "GA3", "rhoA", "rhoI")
+_NUMBERS = ("EI2", "EI3", "GJ", "EA", "GA2", "GA3", "stiffness_", "rhoA", "rhoI")
+_KEYS = ", ".join(_NUMBERS).replace("_", "")
+_OF_MATRIX = ("EI2", "EI3", "GJ", "EA", "GA2", "GA3", "coupling", "law", "tension_center", "shear_center")
 _MATERIAL = ("E", "nu", "G", "rho")
 _DIMENSIONS = ("width", "height", "radius", "outer", "inner")
 
@@ -305,6 +363,23 @@ class CrossSection(Record):
         b2, of twist with bending about b3, and of bending about b2 with bending about b3.  The moment about b1 is
         ``GJ`` times the change of the twist plus the first entry times that of the curvature about b2 plus the
         second times that about b3, and so on.  Needs all three stiffnesses.  Default: zero.
+    stiffness : (6, 6), N, N m, N m²
+        Instead of ``EI2``, ``EI3``, ``GJ``, ``EA``, ``GA2`` and ``GA3``: all forces and moments by all strains of the
+        section, symmetric and positive definite.  Rows are the axial force, the shear forces along b2 and b3, and the
+        moments about b1, b2, b3; columns are stretch, shear along b2 and b3, twist, and the changes of the curvatures
+        about b2 and b3.  Each entry may vary along the member, or the matrix as a whole:
+        ``stiffness = {at = [0, 1], value = [matrix, matrix]}``, linear between.  Default: that of the other numbers.
+    tension_center : (2,), m
+        Place along b2 and b3 of the point of the section at which an axial force bends nothing, from the centre line.
+        ``EA`` acts there, and ``EI2``, ``EI3`` are about axes through it; without ``EA`` the fibre at this place keeps
+        its length.  Default: on the centre line.
+    shear_center : (2,), m
+        Place along b2 and b3 of the point at which shear forces twist nothing, from the centre line.  ``GA2`` and
+        ``GA3`` act there, and ``GJ`` is about it; without them the sections do not shear at this place.  Default: on
+        the centre line.
+    mass_center : (2,), m
+        Place along b2 and b3 of the centre of mass, from the centre line: weight and inertia act there, and ``rhoI`` is
+        about axes through it.  Default: on the centre line.
     rhoA : kg/m
         Mass per length.  Needed with gravity, rotating axes, modes and motions; zero for a member without mass, as
         of a light spring between heavy bodies.
@@ -362,6 +437,10 @@ class CrossSection(Record):
     GA2: Above | None = None
     GA3: Above | None = None
     coupling: Annotated[tuple[Varying, Varying, Varying], BeforeValidator(_three)] | None = None
+    stiffness_: Matrix | None = Field(default=None, alias="stiffness")
+    tension_center: Center | None = None
+    shear_center: Center | None = None
+    mass_center: Center | None = None
     rhoA: Inertia | None = None
     rhoI: Annotated[tuple[Inertia, Inertia, Inertia], BeforeValidator(_three)] | None = None
     law: Law | None = None
@@ -387,16 +466,20 @@ class CrossSection(Record):
         if self.shape is not None:
             if numbers:
                 raise SceneError(
-                    f"found {numbers[0]!r} together with shape = {self.shape!r}, accepted: either "
-                    f"{', '.join(_NUMBERS)} or a shape with {', '.join(_MATERIAL)} and its dimensions"
+                    f"found {numbers[0].rstrip('_')!r} together with shape = {self.shape!r}, accepted: either "
+                    f"{_KEYS} or a shape with {', '.join(_MATERIAL)} and its dimensions"
                 )
             self._check_shape(self.shape)
         elif outlined := self._given((*_MATERIAL, *_DIMENSIONS, "shear_factor")) or self._switched():
             raise SceneError(f"found {outlined[0]!r} without a shape, accepted: shape = {' | '.join(_OUTLINES)}")
         elif not numbers and not (self.law is not None and self.law.gives):
-            raise SceneError(f"found nothing in it, accepted: {', '.join(_NUMBERS)} or a shape")
+            raise SceneError(f"found nothing in it, accepted: {_KEYS} or a shape")
         if self.coupling is not None:
             self._check_coupling()
+        if self.stiffness_ is not None:
+            self._check_matrix(self.stiffness_)
+        if self.mass_center is not None and self.rhoA is None and self.rho is None:
+            raise SceneError(f"found a mass centre without a mass, accepted: with {self._of_mass}", ("mass_center",))
         if self.law is not None:
             self._check_law(self.law)
         return self
@@ -439,6 +522,41 @@ class CrossSection(Record):
             beside = ", ".join(f"{entry:g}" for entry in matrices[i].diagonal())
             message = f"found {say(found)}{where} beside GJ, EI2 and EI3 of {beside}"
             raise SceneError(f"{message}, accepted: a positive definite stiffness matrix", ("coupling",))
+
+    @property
+    def _of_mass(self) -> str:
+        return "rhoA" if self.shape is None else "rho"
+
+    def _check_matrix(self, rows: Any) -> None:
+        given = [name for name in _OF_MATRIX if getattr(self, name) is not None]
+        if given:
+            message = f"found {given[0]!r} beside a stiffness matrix, which has all of it, accepted: one of them"
+            raise SceneError(message, ("stiffness",))
+        edges = np.array([0.0, *self.breaks, 1.0])
+        x = np.unique(edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, SAMPLES))
+        matrices = values_of(self._matrices(x))
+        diagonal = np.einsum("nii->ni", matrices)
+        where = ["" if self.even else f" at {place:g} of the length" for place in x]
+        if (diagonal <= 0.0).any():
+            n, i = (int(k) for k in np.argwhere(diagonal <= 0.0)[0])
+            found = f"found {diagonal[n, i]:g} in row {i + 1}, column {i + 1}{where[n]}"
+            message = f"{found}, accepted: numbers above zero on the diagonal"
+            raise SceneError(message, ("stiffness",))
+        unit = np.sqrt(diagonal)
+        scaled = matrices / unit[:, :, None] / unit[:, None, :]
+        apart = np.abs(scaled - scaled.transpose(0, 2, 1))
+        if apart.max() > tolerances.WRITTEN:
+            n, i, j = (int(k) for k in np.unravel_index(apart.argmax(), apart.shape))
+            i, j = min(i, j), max(i, j)
+            found = f"found {matrices[n, i, j]:g} in row {i + 1}, column {j + 1}, and {matrices[n, j, i]:g} in row "
+            raise SceneError(f"{found}{j + 1}, column {i + 1}{where[n]}, accepted: a symmetric matrix", ("stiffness",))
+        lowest = np.linalg.eigvalsh(scaled)[:, 0]
+        n = int(np.argmin(lowest))
+        if lowest[n] <= tolerances.RANK:
+            message = (
+                f"found a matrix{where[n]} whose lowest eigenvalue is {lowest[n]:.3g} where its diagonal is scaled"
+            )
+            raise SceneError(f"{message} to one, accepted: a positive definite matrix", ("stiffness",))
 
     def _given(self, names: Iterable[str]) -> list[str]:
         return [name for name in names if getattr(self, name) is not None]
@@ -489,7 +607,31 @@ class CrossSection(Record):
     def varying(self) -> list[Quantity]:
         """What may vary along the member, of all that is given."""
         names = ("EI2", "EI3", "GJ", "EA", "GA2", "GA3", "rhoA", "E", "G", "rho", *_DIMENSIONS)
-        return [getattr(self, name) for name in self._given(names)] + [*(self.coupling or ()), *(self.rhoI or ())]
+        found = [getattr(self, name) for name in self._given(names)] + [*(self.coupling or ()), *(self.rhoI or ())]
+        centers = (self.tension_center, self.shear_center, self.mass_center)
+        found += [entry for center in centers for entry in center or ()]
+        return found + [entry for row in self.stiffness_ or () for entry in row]
+
+    def leaves(self, axis: int) -> tuple[str, str] | None:
+        """Key and words of what takes a plane member out of its plane, of which the axis b2 or b3 (2 or 3) is across.
+
+        None where nothing does.
+        """
+        if self.couples(axis):
+            return "coupling", "couples bending in x-y with twist or bending out of it"
+        inside = {2: (0, 2, 4), 3: (0, 1, 5)}[axis]
+        if any(
+            row[j] != 0.0
+            for i, row in enumerate(self.stiffness_ or ())
+            for j in range(6)
+            if (i in inside) != (j in inside)
+        ):
+            return "stiffness", "couples forces and bending in x-y with others"
+        for key in ("tension_center", "shear_center", "mass_center"):
+            center = getattr(self, key)
+            if center is not None and center[axis - 2] != 0.0:
+                return key, "is not in x-y"
+        return None
 
     def couples(self, axis: int) -> bool:
         """Whether bending about the axis b2 or b3, given as 2 or 3, is coupled with anything else."""
@@ -501,12 +643,33 @@ class CrossSection(Record):
     @property
     def coupled(self) -> bool:
         """Whether the stiffness at rest is more than a diagonal of GJ, EI2 and EI3."""
-        return self.coupling is not None or (self.law is not None and self.law.type == "potential")
+        given = self.coupling is not None or self.stiffness_ is not None
+        return given or (self.law is not None and self.law.type == "potential")
+
+    @property
+    def off_line(self) -> str:
+        """Key of the first of its centres that is off the line, or of the matrix that says so; else empty."""
+        if self.stiffness_ is not None and self.shifted:
+            return "stiffness"
+        return next((key for key in OFF_LINE if key != "stiffness" and getattr(self, key) is not None), "")
+
+    @property
+    def matrix(self) -> bool:
+        """Whether it is given by a stiffness matrix of forces and moments."""
+        return self.stiffness_ is not None
+
+    @property
+    def shifted(self) -> bool:
+        """Whether bending or twist stretch or shear the centre line where no force acts: the centres are off it."""
+        if self.stiffness_ is not None:
+            return any(row[j] != 0.0 for row in self.stiffness_[:3] for j in range(3, 6))
+        return self.tension_center is not None or self.shear_center is not None
 
     def missing(self, names: Iterable[str]) -> list[str]:
         """Which of the names EI2, EI3, GJ, rhoA (N m2, kg/m) this section does not define, in the order given."""
         if self.shape is None:
             known = set(self._given(_NUMBERS)) | {"rhoI"}
+            known |= {"EI2", "EI3", "GJ", "EA", "GA2", "GA3"} if self.stiffness_ is not None else set()
         else:
             known = {"EI2", "EI3"}
             known |= {"GJ"} if self.sheared else set()
@@ -533,6 +696,8 @@ class CrossSection(Record):
 
     def own_stiffness(self, x: ArrayLike) -> Floats:
         """What :meth:`stiffness` is without the law, (n, 3), N m2, at fractions x (n,)."""
+        if self.stiffness_ is not None:
+            return np.stack([self._condensed(x)[:, i, i] for i in range(3)], axis=1)
         if self.shape is None:
             return np.stack([self._value(name, x) for name in ("GJ", "EI2", "EI3")], axis=1)
         _, about_2, about_3, torsion = self._outline(x)
@@ -550,7 +715,7 @@ class CrossSection(Record):
     @property
     def stretches(self) -> bool:
         """Whether it stretches or shears."""
-        return bool(self._given(("EA", "GA2", "GA3")) or self._switched())
+        return bool(self._given(("EA", "GA2", "GA3", "stiffness_")) or self._switched())
 
     def compliance(self, x: ArrayLike) -> Floats:
         """Strains by section forces along the member.
@@ -562,8 +727,12 @@ class CrossSection(Record):
 
         Returns
         -------
-        (n, 3) - 1/EA, 1/GA2, 1/GA3 in 1/N (along b1, b2, b3), zero where it neither stretches nor shears
+        (n, 3) - 1/EA, 1/GA2, 1/GA3 in 1/N (along b1, b2, b3), zero where it neither stretches nor shears; of a
+        stiffness matrix the diagonal of :meth:`compliance_of_forces`
         """
+        if self.stiffness_ is not None:
+            found = self.compliance_of_forces(x)
+            return np.stack([found[:, i, i] for i in range(3)], axis=1)
         if self.shape is None:
             values = [getattr(self, name) for name in ("EA", "GA2", "GA3")]
             return np.stack([evaluate(0.0, x) if v is None else 1.0 / evaluate(v, x) for v in values], axis=1)
@@ -591,8 +760,69 @@ class CrossSection(Record):
             6.0 * (1.0 + nu) * square / ((7.0 + 6.0 * nu) * square + (20.0 + 12.0 * nu) * np.square(hole))
         )
 
+    # With a matrix [[A, B], [B^T, D]] of forces and moments the energy is, squares completed,
+    #     1/2 (gamma - Q kappa).A (gamma - Q kappa) + 1/2 kappa.C kappa,   Q = -A^-1 B,   C = D - B^T A^-1 B.
+    # Centres off the line are a Q of their own: with the centre at c the strain there is gamma + kappa x c.
+
+    def compliance_of_forces(self, x: ArrayLike) -> Floats:
+        """Strains by forces of a section that is neither bent nor twisted: ``A^-1``.
+
+        Parameters
+        ----------
+        x : (n,)
+            Fractions of the length.
+
+        Returns
+        -------
+        (n, 3, 3) - stretch, shear along b2 and b3 by forces along b1, b2, b3, 1/N; zero where it does not yield
+        """
+        if self.stiffness_ is not None:
+            return _inverse(self._matrices(x)[:, :3, :3])
+        return self.compliance(x)[:, :, None] * np.eye(3)
+
+    def arms(self, x: ArrayLike) -> Floats:
+        """Strains of the centre line by twist and bending where no force acts: ``Q``.
+
+        Parameters
+        ----------
+        x : (n,)
+            Fractions of the length.
+
+        Returns
+        -------
+        (n, 3, 3) - stretch, shear along b2 and b3 by changes of twist and of the curvatures about b2 and b3, m
+        """
+        x = np.atleast_1d(numbers(x))
+        if self.stiffness_ is not None:
+            whole = self._matrices(x)
+            return -np.einsum("nij,njk->nik", _inverse(whole[:, :3, :3]), whole[:, :3, 3:])
+        (t2, t3), (s2, s3) = (
+            [evaluate(entry, x) for entry in center or (0.0, 0.0)]
+            for center in (self.tension_center, self.shear_center)
+        )
+        nothing = np.zeros(len(x))
+        rows = (nothing, -t3, t2, s3, nothing, nothing, -s2, nothing, nothing)
+        return np.stack(rows, axis=1).reshape(len(x), 3, 3)
+
+    def mass_arm(self, x: ArrayLike) -> Floats:
+        """Place of the centre of mass from the centre line, (n, 3) m along b1, b2, b3, at fractions x (n,)."""
+        x = np.atleast_1d(numbers(x))
+        places = [evaluate(entry, x) for entry in self.mass_center or (0.0, 0.0)]
+        return np.stack([np.zeros(len(x)), *places], axis=1)
+
+    def _matrices(self, x: ArrayLike) -> Floats:
+        """The stiffness matrices, (n, 6, 6)."""
+        x = np.atleast_1d(numbers(x))
+        entries = [evaluate(entry, x) for row in self.stiffness_ or () for entry in row]
+        return np.stack(entries, axis=1).reshape(len(x), 6, 6)
+
+    def _condensed(self, x: ArrayLike) -> Floats:
+        """Moments by changes of the curvatures of a section without forces, (n, 3, 3), N m2."""
+        whole = self._matrices(x)
+        return whole[:, 3:, 3:] + np.einsum("nji,njk->nik", whole[:, :3, 3:], self.arms(x))
+
     def stiffness_matrix(self, x: ArrayLike) -> Floats:
-        """Stiffness along the member as matrices, with what couples twist and bending.
+        """Stiffness along the member as matrices, with what couples twist and bending, where no force acts.
 
         Parameters
         ----------
@@ -603,6 +833,8 @@ class CrossSection(Record):
         -------
         (n, 3, 3) - moments about b1, b2, b3 by changes of the curvatures about them, N m2, zero where not defined
         """
+        if self.stiffness_ is not None:
+            return self._condensed(x)
         found = np.nan_to_num(self.own_stiffness(x))[:, :, None] * np.eye(3)
         if self.law is not None:
             return self.law.stiffness(self, found, np.atleast_1d(numbers(x)))
@@ -620,9 +852,7 @@ class CrossSection(Record):
         if not self.coupled:
             values = self.stiffness(x)
             return np.where(np.isnan(values), 0.0, 1.0 / values)[:, :, None] * np.eye(3)
-        a, b, c = (self.stiffness_matrix(x)[:, i] for i in range(3))
-        columns = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
-        return columns / np.einsum("ni,ni->n", a, np.cross(b, c))[:, None, None]
+        return _inverse(self.stiffness_matrix(x))
 
     def fibres(self, x: ArrayLike) -> Floats:
         """Young's modulus (N/m2) and distances (m) of the outermost fibre from axes b2 and b3, (n, 3), at x (n,)."""

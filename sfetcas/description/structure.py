@@ -11,7 +11,7 @@ from ..errors import SceneError
 from .formulas import Formula
 from .matrices import Mass, Stiffness, check_mass, check_stiffness
 from .records import Direction, NotNegative, Record, Vector, counted, listed, number, say, turn, whole
-from .sections import CrossSection, Polynomial, Quantity, Table, quantity
+from .sections import OFF_LINE, CrossSection, Polynomial, Quantity, Table, quantity
 from .shapes import Shape, Straight
 
 __all__ = ["SLIDING", "Member", "Node", "released", "unit"]
@@ -227,6 +227,19 @@ class Member(Record):
     stiffness: Stiffness | None = None
     mass: Mass | None = None
     spin: Spin | None = None
+
+    def overhangs(self, sections: Mapping[str, CrossSection]) -> bool:
+        """Whether it is flexible and the centre of mass of its section is off its line."""
+        return self.type == "flexible" and sections[str(self.section)].mass_center is not None
+
+    def off_line(self, sections: Mapping[str, CrossSection]) -> str:
+        """What a flexible member has off its line, in words; empty where it has nothing."""
+        key = sections[str(self.section)].off_line if self.type == "flexible" else ""
+        return OFF_LINE.get(key, "")
+
+    def shifted(self, sections: Mapping[str, CrossSection]) -> bool:
+        """Whether it is flexible and its section couples forces with moments, as by centres that are off its line."""
+        return self.type == "flexible" and sections[str(self.section)].shifted
 
     def stretches(self, sections: Mapping[str, CrossSection]) -> bool:
         """Whether it is flexible and its section stretches or shears."""

@@ -72,6 +72,11 @@ class Conserving(Method):
                 )
                 key = "shear" if model.scene.sections[section].shear else "GA2"
                 raise SceneError(message, ("sections", section, key))
+        for member in model.scene.members.values():
+            off = member.off_line(model.scene.sections)
+            if off:
+                message = f"found {off} with the integrator 'conserving', accepted: radau-3, radau-2, generalised-alpha"
+                raise SceneError(message, ("sections", str(member.section)))
         n = system.layout
         q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
         begin = Begin(

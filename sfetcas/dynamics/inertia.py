@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, Index
 from ..mathematics.constants import mapped
 from ..mathematics.linear import SparseMap
 from ..mechanics.balance import three
@@ -14,6 +14,7 @@ from ..mechanics.batches import GroupBatch
 from ..mechanics.equations import Equations, State
 from ..mechanics.load_terms import carried
 from ..mechanics.loading import Loading
+from ..mechanics.mass_centers import along_elements
 from ..mechanics.terms import rotation_gradient
 from .stages import StageEquations
 
@@ -115,10 +116,12 @@ class Inertia:
             parts = (part.reshape(count, -1)[:, :kept] for part in (value, momentum))
             vectors, its = (three(part.reshape(count, -1, self.system.axes)) for part in parts)
             if group.kind.from_place:
+                placed = group.kind.from_place
                 vectors = vectors.copy()
-                vectors[:, 0] += three(self._rest[group.places[:, 0]])
-                own = group.mass[:, 0]
-                total, first, mass = total + its[:, 0].sum(axis=0), first + own @ vectors[:, 0], mass + own.sum()
+                vectors[:, :placed] += three(self._rest[group.places[:, :1]])
+                own = group.mass[:, : self.system.axes * placed : self.system.axes]
+                total, mass = total + its[:, :placed].sum(axis=(0, 1)), mass + own.sum()
+                first = first + np.einsum("nk,nka->a", own, vectors[:, :placed])
             angular = angular + np.cross(vectors, its).sum(axis=(0, 1))
         return total, angular - np.cross(first / mass, total)
 
@@ -134,8 +137,13 @@ class Inertia:
         pull, carried_to = carried(spread, model.segments, model.element)
         moment, own = np.zeros_like(loading.moment), on_places.copy()
         couple, jump = loading.couple.copy(), loading.jump.copy()
+        along: list[tuple[Index, Array, Array]] = []
         places = equations.places(state, loading).reshape(system.places, system.axes)
         for group, batch, (begin, end) in zip(self._masses.observables, self._batches, system.ranges, strict=True):
+            if group.along is not None:
+                elements, arms = group.along
+                along.append((elements, arms, -forces[begin:end].reshape(arms.shape)))
+                continue
             shares = -batch(state.q, places, state.unwrapped, None, forces[begin:end])[3]
             width = system.turns
             for side, turns in enumerate(group.turns.T):
@@ -149,6 +157,7 @@ class Inertia:
             for side, at in enumerate(group.places.T):
                 used, begin_of = at >= 0, first + system.axes * side
                 np.add.at(own, at[used], shares[used, begin_of : begin_of + system.axes])
+        loading = along_elements(model, state.q, loading, along)
         return replace(
             loading,
             force=loading.force + own + carried_to,

@@ -197,7 +197,9 @@ class SmallMotion:
     def _strained(self, system: StageEquations) -> ca.DM:
         """Turned tangents of all points by full coordinates, as far as strains change them."""
         model, axes = self.model, self.model.element.axes
-        columns = model.beams.compliance.reshape(*model.segments.strains.shape, axes, axes)
+        columns = model.beams.compliance.reshape(*model.segments.strains.shape, model.element.yielding, axes)[
+            :, :, :axes
+        ]
         q = turned_points(model, self.state.q)[:, :, None].repeat(axes, axis=2)
         values = quaternion.turned_by(q, columns).reshape(-1, axes, axes)
         strains = model.segments.strains.ravel()

@@ -46,9 +46,10 @@ class Beams:
         Tangent of the unloaded centre line times weight times length.
     weight : ndarray (elements, points)
         Weight of the integration point times length of the element.
-    compliance : ndarray (elements, points, axes * axes)
+    compliance : ndarray (elements, points, axes * axes or more)
         Changes of the tangent by the scaled strains of a point, fixed axes of the undeformed scene, column by column:
-        along the member, then across it; zero where it is stiff.  Of length zero where nothing stretches.
+        along the member, then across it; zero where it is stiff.  Of length zero where nothing stretches.  Where a
+        section couples forces with moments, columns follow for the change of the curvature times length.
     first : dict
         Number of the first element of each member.
     """
@@ -135,11 +136,8 @@ def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beam
         tangent.append(frames[:, : element.axes, 0].reshape(*x.shape, -1) * w[..., None])
         weight.append(w)
         compliance.append(np.zeros((*x.shape, size)))
-        if element.strains and member.stretches(scene.sections):
-            found = scene.sections[str(member.section)].compliance(x.ravel()) * scales.force
-            strained = line.strained_axes(element.space)
-            roots = np.sqrt(w.reshape(-1, 1) * found[:, strained])
-            columns = frames[:, : element.axes, strained] * roots[:, None, :]
+        if element.yielding and (member.stretches(scene.sections) or member.shifted(scene.sections)):
+            columns = _columns(scene, name, x.ravel(), frames, element, scales, w.ravel())
             compliance[-1] = columns.transpose(0, 2, 1).reshape(*x.shape, -1)
         first[name] = count
         count += len(w)
@@ -155,6 +153,48 @@ def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beam
         compliance=np.concatenate(compliance),
         first=first,
     )
+
+
+def _columns(
+    scene: Scene, name: str, x: Array, frames: Array, element: Element, scales: Scales, weight: Array
+) -> Array:
+    """Changes of the tangents of a member (points, axes, numbers), as of :attr:`Beams.compliance`."""
+    section, line = scene.sections[str(scene.members[name].section)], scene.center_lines[name]
+    strained, found = line.strained_axes(element.space), list[Array]()
+    onto = frames[:, : element.axes, strained]
+    if element.strains:
+        if section.matrix:
+            soft = section.compliance_of_forces(x)[:, strained][:, :, strained] * scales.force
+            found.append(np.einsum("nij,njk->nik", onto, _root(weight[:, None, None] * soft)))
+        else:
+            found.append(
+                onto * np.sqrt(weight[:, None] * section.compliance(x)[:, strained] * scales.force)[:, None, :]
+            )
+    if element.shifted and section.shifted:
+        arms = (
+            section.arms(x)[:, strained]
+            * (np.tile(element.weights, len(x) // len(element.weights)) / scales.length)[:, None, None]
+        )
+        about = frames[:, 3 - element.turns :]
+        found.append(np.einsum("nij,njk,nlk->nil", onto, arms, about))
+    elif element.shifted:
+        found.append(np.zeros((len(x), element.axes, element.turns)))
+    return np.concatenate(found, axis=2)
+
+
+def _root(matrices: Array) -> Array:
+    """Lower triangular roots (n, k, k) of positive definite matrices: ``L L^T``; of two or three rows, also symbols."""
+    size, nothing = matrices.shape[1], np.zeros(len(matrices))
+    rows: list[list[Array]] = []
+    for i in range(size):
+        row: list[Array] = []
+        for j in range(i + 1):
+            other = row if i == j else rows[j]
+            rest = sum((row[k] * other[k] for k in range(j)), nothing)
+            rest = matrices[:, i, j] - rest
+            row.append(np.sqrt(rest) if i == j else rest / rows[j][j])
+        rows.append([*row, *[nothing] * (size - i - 1)])
+    return np.stack([entry for row in rows for entry in row], axis=1).reshape(len(matrices), size, size)
 
 
 def in_fixed_axes(values: Array, frames: Array, element: Element, bending_axis: int) -> Array:

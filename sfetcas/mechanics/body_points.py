@@ -21,7 +21,7 @@ Source: ours; the points are a factor of the moments of :class:`~sfetcas.mechani
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import final
 
 import casadi as ca
 import numpy as np
@@ -50,8 +50,6 @@ class BodyPoints(Term):
         Number of nodes of the member, of points and of numbers.
     """
 
-    from_place: ClassVar[bool] = True
-
     nodes: int
     points: int
     numbers: int
@@ -60,6 +58,11 @@ class BodyPoints(Term):
     def vectors(self) -> int:
         """Number of points; only these have momentum."""
         return self.points
+
+    @property
+    def from_place(self) -> int:
+        """The centre."""
+        return 1
 
     @property
     def _body(self) -> Body:

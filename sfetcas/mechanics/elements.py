@@ -20,6 +20,12 @@ compliance ``C_n^-1`` (axial, shear) in its axes ``R_0``, the tangent of a point
 ``S = R_0 (length weight C_n^-1)^1/2``, and the energy gains ``1/2 eta.eta``.  Their stiffness is the identity, whatever
 the section's, so that members that hardly stretch are as well conditioned as those that do not.
 
+Where forces and moments are coupled, as where the centres of tension or shear are off the line, the change of the
+curvature strains the line by itself: the tangent is ``R(q) (t_0 + S eta + P k)`` with ``k`` the change of the curvature
+times length and ``P = weight R_0 Q R_0^T``.  With the stiffness ``[[A, B], [B^T, D]]`` of forces and moments it is
+``Q = -A^-1 B``, and the stiffness of the strain energy ``D - B^T A^-1 B``: squares are completed.  A line that is off
+a fibre which keeps its length needs no strains at all.
+
 Two ways to integrate: *at the nodes* (Lobatto), where ``q`` is exactly unit and everything is polynomial, and
 *Gauss*, with the interpolated quaternion divided by its norm.  Both are of order 2p at the element ends.
 
@@ -58,11 +64,14 @@ class Element(Term):
         Integration at p + 1 Gauss points of the normalised interpolation instead of at the nodes.
     strains : bool
         Whether the scaled strains of the points are sides: as places, one for each point.
+    shifted : bool
+        Whether the change of the curvature strains the line by itself.
     """
 
     order: int
     gauss: bool = False
     strains: bool = False
+    shifted: bool = False
 
     @property
     def name(self) -> str:
@@ -83,7 +92,12 @@ class Element(Term):
     @property
     def compliances(self) -> int:
         """Numbers of compliance at a point: a matrix, column by column, or none."""
-        return self.axes**2 if self.strains else 0
+        return self.axes * self.yielding
+
+    @property
+    def yielding(self) -> int:
+        """By how many numbers of a point its tangent changes before it is turned: strains, then the curvature's."""
+        return (self.axes if self.strains else 0) + (self.turns if self.shifted else 0)
 
     @property
     def stiffnesses(self) -> int:
@@ -137,17 +151,24 @@ class Element(Term):
     def tangents(self, q: list[Side], u: list[Side], data: ca.SX) -> list[ca.SX]:
         """Turned and strained tangents of the points, for data of which the last are those of :attr:`line_data`."""
         tangent, compliance = self.line(data[-self.line_data :])
-        here = self.at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))[0]
-        strains = [ca.vertcat(*side) for side in u]
+        here, slope = self.at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
         found = []
         for k in range(self.order + 1):
-            strained = self.strained(tangent[:, k], compliance[:, k], strains[k]) if strains else tangent[:, k]
-            found.append(self._tangent(here[:, k], strained))
+            by = self.yields(here[:, k], slope[:, k], ca.vertcat(*u[k]) if u else ca.SX(0, 1))
+            found.append(self._tangent(here[:, k], self.strained(tangent[:, k], compliance[:, k], by)))
         return found
 
-    def strained(self, tangent: ca.SX, compliance: ca.SX, strain: ca.SX) -> ca.SX:
-        """Tangent of one point with its scaled strain, before it is turned."""
-        return tangent + ca.mtimes(ca.reshape(compliance, self.axes, self.axes), strain)
+    def yields(self, here: ca.SX, slope: ca.SX, strain: ca.SX) -> ca.SX:
+        """By what the tangent of one point changes before it is turned: its scaled strain, then its curvature's."""
+        if not self.shifted:
+            return strain
+        return ca.vertcat(strain, self.curvature(here, slope) if self.space else slope)
+
+    def strained(self, tangent: ca.SX, compliance: ca.SX, by: ca.SX) -> ca.SX:
+        """Tangent of one point before it is turned, with what :meth:`yields` says."""
+        if not self.yielding:
+            return tangent
+        return tangent + ca.mtimes(ca.reshape(compliance, self.axes, self.yielding), by)
 
     @property
     def line_data(self) -> int:
@@ -288,7 +309,7 @@ class Element(Term):
         the geometric stiffness of its axial part about both normals, with the sign of tension also in compression.
         """
         symbols, q, point, _ = self._large_symbols()
-        stiffness, tangent, pull = point[-3 - self.strains], self._tangent_of(point), point[-1]
+        stiffness, tangent, pull = point[-3 - bool(self.yielding)], self._tangent_of(point), point[-1]
         if self.space:
             own = self._convex_in_space(q, stiffness, tangent, pull)
         else:
@@ -330,14 +351,14 @@ class Element(Term):
         symbols = [ca.MX.sym(name, *shape) for name, shape in zip(ARGUMENTS, shapes, strict=True)]
         given = ca.reshape(symbols[3], self.axes, turns)
         stiffness, tangent, compliance = self.split(symbols[2])
-        strains, compliances = ([symbols[1]], [compliance]) if self.strains else ([], [])
+        strains, compliances = [symbols[1]] if self.strains else [], [compliance] if self.yielding else []
         at = self.at(symbols[0]) if self.space else ()
         point = [*at, *strains, stiffness, tangent, *compliances, given + ca.repmat(symbols[4], 1, turns)]
         return symbols, symbols[0], point, given
 
     def _tangent_of(self, point: list[ca.MX]) -> ca.MX:
         """Tangents of the undeformed centre line among the arguments of the functions of a point."""
-        return point[-2 - self.strains]
+        return point[-2 - bool(self.yielding)]
 
     def _function(self, name: str, arguments: list[ca.MX], results: dict[str, ca.MX]) -> ca.Function:
         names = [*ARGUMENTS, "weight"][: len(arguments)]
@@ -424,11 +445,13 @@ class Element(Term):
     def _by_sides(self, change: list[ca.MX]) -> ca.MX:
         """Derivative of the chord by the components of the nodes (3, 4 nodes), then by the strains (3, 3 points).
 
-        From those of the tangents (3, 4 points) by the rotations there, and (3, 3 points) by the strains.
+        From those of the tangents (3, 4 points) by the rotations there, where they change with them by the slopes, and
+        (3, 3 points) by the strains.
         """
-        n = self.order + 1
-        by_nodes = ca.reshape(ca.mtimes(ca.reshape(change[0], 12, n), self._shape), 3, 4 * n)
-        return ca.densify(ca.horzcat(by_nodes, *change[1:]))
+        n, first = self.order + 1, 1 + self.shifted
+        sides = zip(change[:first], (self._shape, self._derivative), strict=False)
+        parts = [ca.mtimes(ca.reshape(part, 12, n), side) for part, side in sides]
+        return ca.densify(ca.horzcat(ca.reshape(sum(parts[1:], parts[0]), 3, 4 * n), *change[first:]))
 
     def _between_sides(self, hessian: ca.MX) -> ca.MX:
         """Second derivatives by the components of the nodes, then by the strains, from those of the points."""
@@ -487,14 +510,14 @@ class Element(Term):
         """Arguments of a point (see :meth:`_point_symbols`) -> gradient, or Hessian with the energy times a weight.
 
         That is: turned tangent, gradient (8,) or (11,), and the derivatives of the turned tangent by the rotation
-        (3, 4) and the strain (3, 3); or the Hessian alone.
+        (3, 4), where it changes with it by the slope (3, 4), and by the strain (3, 3); or the Hessian alone.
         """
         symbols, weight = self._point_symbols(), ca.SX.sym("weight")
         strain, now, changed = self._point_energy(symbols)
         name = f"point_{what}_{name_of(self)}"
         if what == "gradient":
             gradient = ca.gradient(strain + ca.dot(symbols[-1], now), ca.vertcat(*changed))
-            results = [now, gradient, *(ca.jacobian(now, part) for part in (changed[0], *changed[2:]))]
+            results = [now, gradient, *self._changes_of(now, changed)]
             return ca.Function(name, symbols, [ca.densify(one) for one in results], {"cse": True})
         hessian = ca.hessian(weight * strain + ca.dot(symbols[-1], now), ca.vertcat(*changed))[0]
         return ca.Function(name, [*symbols, weight], [ca.densify(hessian)], {"cse": True})
@@ -504,28 +527,41 @@ class Element(Term):
         """Arguments of one point (see :meth:`_point_symbols`) -> its share of :meth:`rotation_gradient`.
 
         Strain energy, turned tangent, gradient and Hessian by rotation, slope and strain, and the derivatives of the
-        turned tangent by the rotation (3, 4) and the strain (3, 3).
+        turned tangent as of :meth:`_of_point`.
         """
         symbols = self._point_symbols()
         strain, now, changed = self._point_energy(symbols)
         hessian, gradient = ca.hessian(strain + ca.dot(symbols[-1], now), ca.vertcat(*changed))
-        results = [strain, now, gradient, hessian, *(ca.jacobian(now, part) for part in (changed[0], *changed[2:]))]
+        results = [strain, now, gradient, hessian, *self._changes_of(now, changed)]
         return ca.Function(f"point_{name_of(self)}", symbols, [ca.densify(one) for one in results], {"cse": True})
+
+    def _changes_of(self, now: ca.SX, changed: list[ca.SX]) -> list[ca.SX]:
+        """Derivatives of the turned tangent of a point by what it depends on."""
+        return [ca.jacobian(now, part) for part in changed[:: 1 if self.shifted else 2]]
 
     def _point_energy(self, symbols: list[ca.SX]) -> tuple[ca.SX, ca.SX, list[ca.SX]]:
         """Strain energy and turned tangent of one point in space, and what they depend on."""
-        if not self.strains:
+        if not self.yielding:
             here, slope, stiffness, tangent, _ = symbols
             return self._strain_energy(here, slope, stiffness), self._tangent(here, tangent), [here, slope]
-        here, slope, strain, stiffness, tangent, compliance, _ = symbols
-        stored = self._strain_energy(here, slope, stiffness) + 0.5 * ca.sumsqr(strain)
-        return stored, self._tangent(here, self.strained(tangent, compliance, strain)), [here, slope, strain]
+        here, slope, *strains, stiffness, tangent, compliance, _ = symbols
+        stored = sum((0.5 * ca.sumsqr(strain) for strain in strains), self._strain_energy(here, slope, stiffness))
+        by = self.yields(here, slope, ca.vertcat(ca.SX(0, 1), *strains))
+        return stored, self._tangent(here, self.strained(tangent, compliance, by)), [here, slope, *strains]
 
     def _point_symbols(self) -> list[ca.SX]:
         """Rotation, slope, strain, stiffness, tangent, compliance and pull of one point, as far as it has them."""
-        names = {"here": 4, "slope": 4, "strain": 3, "stiffness": 6, "tangent": 3, "compliance": 9, "pull": 3}
-        chosen = {name: size for name, size in names.items() if self.strains or name not in ("strain", "compliance")}
-        return [ca.SX.sym(name, size) for name, size in chosen.items()]
+        strains, yields = 3 * self.strains, self.compliances
+        names = {
+            "here": 4,
+            "slope": 4,
+            "strain": strains,
+            "stiffness": 6,
+            "tangent": 3,
+            "compliance": yields,
+            "pull": 3,
+        }
+        return [ca.SX.sym(name, size) for name, size in names.items() if size]
 
     @functools.cached_property
     def _convex_point(self) -> ca.Function:
@@ -549,6 +585,8 @@ ELEMENTS = tuple(f"SFET{n}" for n in range(2, 10))
 
 
 @functools.cache
-def element_by_name(name: str, space: bool, gauss: bool = False, strains: bool = False) -> Element:
+def element_by_name(
+    name: str, space: bool, gauss: bool = False, strains: bool = False, shifted: bool = False
+) -> Element:
     """The element type of a name; each is made once a process, so that its functions are, too."""
-    return Element(space, ELEMENTS.index(name) + 1, gauss, strains)
+    return Element(space, ELEMENTS.index(name) + 1, gauss, strains, shifted)

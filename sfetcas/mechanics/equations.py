@@ -23,6 +23,7 @@ from ..mathematics.linear import SparseSolver
 from .batches import GroupBatch, at_rest
 from .load_terms import present
 from .loading import Loading
+from .mass_centers import along_elements
 from .model import Model
 from .reactions import Reactions
 from .rotations import RotationFreedom
@@ -454,12 +455,17 @@ class Equations:
             np.zeros_like(part) for part in (found.moment, found.couple, found.jump, found.force)
         )
         massive = [group for group in rotating_frame.masses.observables if group.kind.vectors]
+        along: list[tuple[Index, Array, Array]] = []
         for number, observed in zip(rotating_frame.bodies, massive, strict=True):
             group = self._terms[1 + number]
+            if observed.along is not None:
+                along.append((*observed.along, rotating_frame.at_points(self.model, observed, state.q, places, matrix)))
+                continue
             forces = -group(state, u, loading.loads[number], np.zeros(0))[3]
             group.add_forces(forces, moment, force)
             turns = self.model.element.turns
             observed.put(np.pad(forces[:, :turns], ((0, 0), (3 - turns, 0))), couple, jump)
+        found = along_elements(self.model, state.q, found, along)
         return replace(
             found,
             moment=found.moment + moment,
@@ -527,7 +533,7 @@ def turned_tangents(model: Model, state: State) -> Array:
     dimensionless.
     """
     q = turned_points(model, state.q)
-    return quaternion.turned_by(q, model.beams.tangent + gained_tangents(model, state.y))
+    return quaternion.turned_by(q, model.beams.tangent + gained_tangents(model, state))
 
 
 def turned_points(model: Model, q: Array) -> Array:
@@ -538,15 +544,38 @@ def turned_points(model: Model, q: Array) -> Array:
     return np.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True) if model.space else q)
 
 
-def gained_tangents(model: Model, y: Array) -> Array:
-    """What strains add to the tangents before they are turned, times weight and length, (elements, points, axes),
-    dimensionless.
+def gained_tangents(model: Model, state: State) -> Array:
+    """What strains, and where it does the curvature, add to the tangents before they are turned, times weight and
+    length, (elements, points, axes), dimensionless.
     """
-    element, strains = model.element, model.segments.strains
-    if not element.strains:
+    element = model.element
+    if not element.yielding:
         return np.zeros((1, 1, element.axes))
-    matrices = model.beams.compliance.reshape(*strains.shape, element.axes, element.axes)
-    return np.asarray(np.einsum("ekca,ekc->eka", matrices, scaled_strains(model, y)))
+    by = scaled_strains(model, state.y) if element.strains else np.zeros((*model.beams.weight.shape, 0))
+    if element.shifted:
+        by = np.concatenate([by, curvature_changes(model, state.q)], axis=2)
+    return yielded(model, by)
+
+
+def yielded(model: Model, by: Array, part: slice = slice(None)) -> Array:
+    """Changes (elements, points, axes) of the tangents before they are turned by strains and changes of the curvature
+    (elements, points, numbers), see :attr:`.Element.yielding`.
+    """
+    matrices = model.beams.compliance[part]
+    return np.asarray(np.einsum("ekca,ekc->eka", matrices.reshape(*by.shape, model.element.axes), by))
+
+
+def curvature_changes(model: Model, q: Array) -> Array:
+    """Changes of the curvature times length at the integration points, (elements, points, turns), about the fixed axes
+    of the undeformed scene.
+    """
+    element, nodal = model.element, q[model.rotations.turns]
+    slope = np.einsum("kj,ejc->ekc", interpolation.differentiation(element.nodes, element.points), nodal)
+    if not model.space:
+        return np.asarray(slope)
+    here = np.einsum("kj,ejc->ekc", interpolation.evaluation(element.nodes, element.points), nodal)
+    spin = 2.0 * quaternion.multiply(quaternion.conjugate(here), slope)[..., 1:]
+    return np.asarray(spin / np.einsum("ekc,ekc->ek", here, here)[..., None])
 
 
 def scaled_strains(model: Model, y: Array) -> Array:

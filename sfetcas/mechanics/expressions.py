@@ -144,7 +144,7 @@ class SymbolicTerms:
         ``places`` are the displacements of retained places, (places * axes,).
         """
         element, turns = self.model.element, self.model.rotations.turns
-        if element.gauss or element.strains:
+        if element.gauss or element.yielding:
             sides = self.sides(self.model.terms[0], q, places)
             return self.many(element.turned, self.elements)(*sides, self.data(0, given, ca.MX()))
         at_points = q[:, turns.ravel().tolist()]

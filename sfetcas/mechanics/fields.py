@@ -16,11 +16,12 @@ from .. import tolerances
 from ..description.answers import single_number
 from ..mathematics import curves, quaternion
 from ..mathematics.arrays import Array, first_of_largest
+from ..mathematics.interpolation import differentiation, evaluation
 from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
 from .balance import three as _three
 from .batches import GroupBatch
-from .equations import Equations, State, gained_tangents, scaled_strains, turned_points, turned_tangents
+from .equations import Equations, State, gained_tangents, scaled_strains, turned_points, turned_tangents, yielded
 from .laws import curvature_by_moment, law_of, least_stiffness
 from .loading import Loading
 from .magnetism import magnet_terms
@@ -159,6 +160,10 @@ class Fields:
         if record.type == "rigid":
             return {**result, "curvature": line.curvatures(x)}
         section = model.scene.sections[str(record.section)]
+        forces = np.einsum("nij,ni->nj", frames, result["force"])
+        if section.shifted:
+            arms = section.arms(x)
+            strain = strain + np.einsum("nji,nj->ni", arms, forces)
         if section.law is not None:
             axes = [0, 1, 2] if model.space else [line.bending_axis - 1]
             near = self._changes(member, x)
@@ -170,8 +175,10 @@ class Fields:
             with np.errstate(invalid="ignore"):
                 strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
         result["curvature"] = line.curvatures(x) + self.natural(member, x) + strain
-        if record.stretches(model.scene.sections):
-            result["strain"] = section.compliance(x) * np.einsum("nij,ni->nj", frames, result["force"])
+        if record.stretches(model.scene.sections) or section.shifted:
+            result["strain"] = np.einsum("nij,nj->ni", section.compliance_of_forces(x), forces)
+        if section.shifted:
+            result["strain"] += np.einsum("nij,nj->ni", arms, strain)
         return result
 
     def section_forces(self, member: str, x: Array) -> Array:
@@ -291,7 +298,7 @@ class Fields:
         natural = quaternion.rotate(frames, self.natural(member, x))[:, -turns:] * model.scales.length
         strain = np.zeros((len(x), model.element.axes))
         if model.element.strains:
-            gained = gained_tangents(model, self.state.y)[part] / model.beams.weight[part][..., None]
+            gained = gained_tangents(model, self.state)[part] / model.beams.weight[part][..., None]
             strain = np.einsum("np,npa->na", at.at_points, gained[at.elements])
         given = (body[:, -turns:], guess, natural, strain, data, np.tile(tensions, (len(x), 1)))
         found = function(*(part.T for part in given))
@@ -459,9 +466,12 @@ class Fields:
         if model.element.strains:
             strains = model.segments.strains[part]
             rates = np.where((strains >= 0)[..., None], known[strains], 0.0)
-            matrices = model.beams.compliance[part].reshape(*strains.shape, axes, axes)
-            stretched = np.einsum("ekca,ekc->eka", matrices, rates)
-            gained += quaternion.turned_by(turned_points(model, self.q)[part], stretched)
+        else:
+            rates = np.zeros((*turns.shape, 0))
+        if model.element.shifted:
+            rates = np.concatenate([rates, self._bending_rates(part, about)], axis=2)
+        if model.element.yielding:
+            gained += quaternion.turned_by(turned_points(model, self.q)[part], yielded(model, rates, part))
         parts, segments, cuts = model.segments.parts, model.segments, model.mesh.cuts[member]
         mine = [one for one in parts if one.member == member]
         ends = np.array([mine[0].elements.start, *(one.elements.stop for one in mine)]) - part.start
@@ -478,6 +488,23 @@ class Fields:
         here, change = (np.einsum("nj,njc->nc", rows, values[e]) for values in (nodal, rate))
         turned = 2.0 * quaternion.multiply(change, quaternion.conjugate(here))[:, 1:]
         return velocity, turned / np.einsum("nc,nc->n", here, here)[:, None]
+
+    def _bending_rates(self, part: slice, about: Array) -> Array:
+        """Rates of the curvature times length at the points of elements, (elements, points, turns), about the fixed
+        axes of the undeformed scene, for angular velocities of the nodes (elements, nodes, 3).
+        """
+        model, element = self.model, self.model.element
+        shape, slope = (f(element.nodes, element.points) for f in (evaluation, differentiation))
+        if not model.space:
+            return np.asarray(np.einsum("kj,eja->eka", slope, about[..., 2:]))
+        nodal = self.q[model.rotations.turns[part]]
+        rate = 0.5 * quaternion.multiply(np.pad(about, ((0, 0), (0, 0), (1, 0))), nodal)
+        (q, dq), (s, ds) = ([np.einsum("kj,ejc->ekc", rows, part) for part in (nodal, rate)] for rows in (shape, slope))
+        # Of 2 conj(q) q' / q.q.
+        back, square = quaternion.conjugate(q), np.einsum("ekc,ekc->ek", q, q)[..., None]
+        found = quaternion.multiply(quaternion.conjugate(dq), s) + quaternion.multiply(back, ds)
+        found -= 2.0 * np.einsum("ekc,ekc->ek", q, dq)[..., None] / square * quaternion.multiply(back, s)
+        return np.asarray((2.0 * found / square)[..., 1:])
 
     def _stations(self, member: str, x: Array) -> Stations:
         return Stations(self.model.element, self.model.mesh.cuts[member], x)

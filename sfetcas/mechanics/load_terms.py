@@ -23,6 +23,7 @@ from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers, scattered, values_of
 from ..mathematics.kernels import Batch
+from ..mathematics.quaternion import product
 from .elements import Element
 from .joints import Turning
 from .mesh import Mesh
@@ -112,12 +113,27 @@ class FollowingSpread(Term):
         for tangent, force in zip(tangents, carried, strict=True):
             levers = ca.cross(tangent, force) if self.space else tangent[0] * force[1] - tangent[1] * force[0]
             moments += [-m for m in ca.vertsplit(levers)]
+        if self.element.shifted:
+            moments = self._moments(q, tangents, carried)
         total = sum(forces[1:], forces[0])
         straining = []
         for k in range(len(u) - 1):
             by_strain = ca.jacobian(tangents[k], ca.vertcat(*u[1 + k]))
             straining += [-f for f in ca.vertsplit(ca.mtimes(by_strain.T, carried[k]))]
         return [*moments, *[-f for f in ca.vertsplit(total)], *straining]
+
+    def _moments(self, q: list[Side], tangents: list[ca.SX], carried: list[ca.SX]) -> list[ca.SX]:
+        """Moments on the nodes where a tangent changes with the curvature, and so with the rotations of all of them."""
+        found: list[ca.SX] = []
+        for side in q:
+            by_side = ca.jacobian(ca.vertcat(*tangents), ca.vertcat(*side))
+            work = ca.mtimes(by_side.T, ca.vertcat(*carried))
+            if self.space:
+                basis = [ca.vertcat(*product([0.0, *axis], side)) for axis in np.eye(3).tolist()]
+                found += [-0.5 * ca.dot(one, work) for one in basis]
+            else:
+                found.append(-work)
+        return found
 
     def densities(
         self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX

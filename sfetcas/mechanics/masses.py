@@ -22,6 +22,7 @@ from ..mathematics.interpolation import differentiation, pieces
 from ..mathematics.linear import SparseMap
 from .body_masses import BodyMass, body_mass, euler_weights
 from .body_points import BodyPoints, points_of
+from .mass_centers import MassPoints, arms_of
 from .observed import Axes, SpringTravel, Strains, Stretches
 from .terms import Term
 
@@ -48,6 +49,8 @@ class Observables:
     at : ndarray (n, 2) or None
         For section axes the place and the element to whose balance of moments their inertia belongs, -1 for none; nodes
         that share a rotation have balances of their own.
+    along : tuple (ndarray (n,), ndarray (n, nodes, axes)) or None
+        For points that nodes of elements carry the numbers of these elements and the arms.
     """
 
     kind: Term
@@ -59,6 +62,7 @@ class Observables:
     spring: int | None = None
     numbers: Index | None = None
     at: Index | None = None
+    along: tuple[Index, Array] | None = None
 
     def put(self, moments: Array, couple: Array, jump: Array) -> None:
         """Add moments (n, 3), in place and as ``at`` says, to ``couple`` (places, 3) and ``jump`` (elements, 3)."""
@@ -121,6 +125,8 @@ class _Weigher:
         rigid = [name for name, member in self.scene.members.items() if member.type == "rigid"]
         self.rigid = {int(model.rotations.ends[name][0]) for name in rigid}
         self.bodies: dict[str, BodyMass] = {}
+        # Of points along members: elements, arms (m), masses and dampers, each by elements and nodes.
+        self.points: list[tuple[Index, Array, Array, Array]] = []
         self.total = 0.0
 
     def all(self) -> Masses:
@@ -153,6 +159,7 @@ class _Weigher:
         groups = [
             *self._axes(mass * length**2),
             *self._bodies(mass),
+            *self._points(mass, of_drag),
             *self._strains(time),
             *self._stretches(time),
             *self._springs(time),
@@ -189,6 +196,7 @@ class _Weigher:
         mass = section.mass(x.ravel()).reshape(x.shape) * weights
         drag = section.drag * weights
         self.total += float(mass.sum())
+        mass, drag = self._off_line(name, x, mass, drag)
         for e, (m, d) in enumerate(zip(mass, drag, strict=True), start=part.start):
             segment = model.segments.parts[model.segments.owner[e]]
             for place_name, k in ((segment.start, 0), (segment.end, -1)):
@@ -205,6 +213,29 @@ class _Weigher:
             np.add.at(self.spread, chain[1:-1], spread[1:-1])
             for i in (0, -1):
                 self._turning(int(chain[i]), spread[i], place=model.segments.place(model.segments.ends[name, -i]))
+
+    def _off_line(self, name: str, x: Array, mass: Array, drag: Array) -> tuple[Array, Array]:
+        """Masses and drags (elements, nodes) that are left on the line of a member; all others become points.
+
+        Points are those with arms, and inner nodes of elements whose tangents change with the curvature: where these
+        are follows not only from the rotations of the points of the element.
+        """
+        model, sections, member = self.model, self.scene.sections, self.scene.members[name]
+        shifted, arms = member.shifted(sections), np.zeros((*x.shape, 3))
+        part = model.elements_of(name)
+        elements, inside, left = np.arange(part.start, part.stop), np.ones(x.shape), np.zeros(x.shape)
+        inside[:, [0, -1]] = 0.0
+        if member.overhangs(sections):
+            arms = arms_of(self.scene, name, x.ravel()).reshape(arms.shape)
+            self.points.append((elements, arms, mass, left))
+            mass = left
+        elif shifted:
+            self.points.append((elements, arms, mass * inside, left))
+            mass = mass * (1.0 - inside)
+        if shifted and drag.any():
+            self.points.append((elements, np.zeros(arms.shape), left, drag * inside))
+            drag = drag * (1.0 - inside)
+        return mass, drag
 
     def _add_rigid(self, name: str) -> None:
         """The mass spread over the straight line between the nodes: exact between the displacements of its ends."""
@@ -266,6 +297,29 @@ class _Weigher:
             turns, sides, numbers, masses = (np.array(part) for part in zip(*members, strict=True))
             groups.append(Observables(kind, turns, sides, numbers, masses, np.zeros(masses.shape)))
         return groups
+
+    def _points(self, unit: float, of_drag: float) -> list[Observables]:
+        """Points along members."""
+        if not self.points:
+            return []
+        model, axes, length = self.model, self.axes, self.model.scales.length
+        elements, arms, mass, drag = (np.concatenate(part) for part in zip(*self.points, strict=True))
+        arms = arms[..., :axes] / length
+        starts = [model.segments.place(part.start) for part in model.segments.parts]
+        start = np.array(starts, dtype=np.intp)[model.segments.owner][elements]
+        rest = np.zeros(arms.shape)
+        for name in model.members:
+            part, line, cuts = model.elements_of(name), self.scene.center_lines[name], model.mesh.cuts[name]
+            x = cuts[:-1, None] + np.diff(cuts)[:, None] * model.element.nodes
+            places = line.positions(x.ravel())[:, :axes].reshape(*x.shape, axes) / length
+            own = (elements >= part.start) & (elements < part.stop)
+            rest[own] = (places - places[:, :1])[elements[own] - part.start]
+        line_data = model.beams.flat("tangent", "compliance")[elements]
+        data = np.hstack([rest.reshape(len(rest), -1), arms.reshape(len(arms), -1), line_data])
+        places = np.hstack([start[:, None], model.segments.strains[elements]])
+        mass, drag = (np.repeat(part, axes, axis=1) for part in (mass / unit, drag / of_drag))
+        kind, turns = MassPoints(self.space, model.element), model.rotations.turns[elements]
+        return [Observables(kind, turns, places, data, mass, drag, along=(elements, arms))]
 
     def _strains(self, time: float) -> list[Observables]:
         """Kelvin-Voigt damping of the flexible members that have any."""

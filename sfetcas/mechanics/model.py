@@ -28,6 +28,7 @@ from .laws import laws_in
 from .load_terms import loads_in
 from .loading import Loading, unit_loadings
 from .magnetism import magnets_in
+from .mass_centers import center_weights_in
 from .mesh import Mesh
 from .parts import Parts
 from .positions import Positions, entries, place_nodes
@@ -49,6 +50,7 @@ SOURCES: list[Callable[[Parts], Iterable[One]]] = [
     loads_in,
     actuations_in,
     magnets_in,
+    center_weights_in,
     tendons_in,
 ]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
@@ -304,7 +306,7 @@ def assemble(
     if scene.rotating is not None:
         mesh, assembly = replace(mesh, places=True), "nodal"
     space = scene.resolved_dimension == "space"
-    element = element_by_name(f"SFET{mesh.order + 1}", space, mesh.gauss, scene.stretches)
+    element = element_by_name(f"SFET{mesh.order + 1}", space, mesh.gauss, scene.stretches, scene.shifted)
     scales = scales or scales_of(scene)
     beams, segments = beams_of(scene, mesh, element, scales), cut_members(scene, mesh)
     if like is not None and like.element is element and like.assembly == assembly and segments.alike(like.segments):

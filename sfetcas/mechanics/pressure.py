@@ -24,7 +24,7 @@ __all__ = ["is_pressure"]
 def is_pressure(scene: Scene) -> bool:
     """Whether all follower loads of a scene are such pressure."""
     # Followers are forces per length of the undeformed member, which is not that of the curve where it stretches.
-    if scene.resolved_dimension == "space" or scene.stretches:
+    if scene.resolved_dimension == "space" or scene.stretches or scene.shifted:
         return False
     # By history, of what ends at a node, or within a member at a fraction of its length.
     left: dict[tuple[str | None, str | tuple[str, float]], float] = {}

@@ -18,11 +18,12 @@ import casadi as ca
 import numpy as np
 
 from ..mathematics.arrays import Array, Index
+from ..mathematics.kernels import Batch
 from .elements import Element
 from .load_terms import carried
 from .loading import Loading
-from .masses import Masses, masses_of
-from .terms import Group, Side, Term
+from .masses import Masses, Observables, masses_of
+from .terms import Group, Side, Term, rows_of
 
 __all__ = ["CentrifugalInner", "CentrifugalPair", "CentrifugalVectors", "RotatingFrame", "with_rotating_frame"]
 
@@ -165,6 +166,19 @@ class RotatingFrame:
         pull, on_places = carried(spread, segments, element)
         return replace(model.groups[None].scaled(0.0), force=own + on_places, own=own, spread=spread, pull=pull)
 
+    def at_points(self, model: Any, observed: Observables, q: Array, places: Array, matrix: Array) -> Array:
+        """Centrifugal forces (n, nodes, axes) on points along elements, for displacements ``places`` (places * axes,).
+
+        ``matrix`` is P (axes, axes).
+        """
+        axes, batch = model.element.axes, Batch(rows_of(observed.kind), len(observed.data))
+        u = places.reshape(len(model.segments.places), axes)
+        given = (q[observed.turns], u[observed.places], observed.data, np.zeros((len(observed.data), 0)))
+        for k, values in enumerate(given):
+            batch.set(k, values)
+        rows = batch()[0].reshape(len(observed.data), -1, axes) + self.rest[observed.places[:, :1]]
+        return np.asarray(observed.mass.reshape(rows.shape) * (rows @ matrix))
+
 
 def with_rotating_frame(model: Any) -> Any:
     """A :class:`~sfetcas.mechanics.model.Model` with the centrifugal terms of its rotating axes added.
@@ -228,8 +242,11 @@ def _groups(model: Any, masses: Masses, rest: Array, inner_rest: Array) -> tuple
     def joined(*parts: Array) -> Array:
         return np.hstack([part.reshape(len(parts[0]), -1) for part in parts])
 
-    pairs = np.stack([masses.places.row, masses.places.column], axis=1)
-    data = joined(rest[pairs], masses.places.value)
+    pairs, mass = np.stack([masses.places.row, masses.places.column], axis=1), masses.places.value
+    if not len(pairs):
+        # No place has mass of its own where all of it is along members; the group tells P nevertheless.
+        pairs, mass = np.zeros((1, 2), np.intp), np.zeros(1)
+    data = joined(rest[pairs], mass)
     found = [_group(CentrifugalPair(space), np.zeros((len(pairs), 0), np.intp), pairs, data, "mass")]
     heavy = np.flatnonzero(masses.inner.any(axis=1))
     if len(heavy):
@@ -247,8 +264,7 @@ def _groups(model: Any, masses: Masses, rest: Array, inner_rest: Array) -> tuple
             continue
         mass = group.mass[:, : vectors * element.axes : element.axes]
         added = np.zeros((len(group.data), vectors, element.axes))
-        if group.kind.from_place:
-            added[:, 0] = rest[group.places[:, 0]]
+        added[:, : group.kind.from_place] = rest[group.places[:, :1]]
         data = joined(group.data, np.concatenate([added, mass[:, :, None]], axis=2))
         bodies.append(_group(CentrifugalVectors(space, group.kind), group.turns, group.places, data, "body"))
     return found, bodies

@@ -103,7 +103,8 @@ class Routed(_Part):
                 turned = ca.cross(self.element.curvature(here[:, k], slope[:, k]), arm[:, k])
             else:
                 turned = slope[0, k] * ca.vertcat(-arm[1, k], arm[0, k])
-            way = self.element.strained(forward[:, k], compliance[:, k], ca.vertcat(*u[k])) if u else forward[:, k]
+            by = self.element.yields(here[:, k], slope[:, k], ca.vertcat(*u[k]) if u else ca.SX(0, 1))
+            way = self.element.strained(forward[:, k], compliance[:, k], by)
             total += ca.norm_2(way + turned)
         return total
 
@@ -111,7 +112,7 @@ class Routed(_Part):
 
     def rotation_gradient(self) -> ca.Function:
         """As :meth:`.Term.rotation_gradient`; in space assembled from the derivatives of single points."""
-        if not self.space or self.element.strains:
+        if not self.space or self.element.yielding:
             return super().rotation_gradient()
         symbols, q, forward, arm, rest = self._large_symbols()
         _, _, _, load, lam = symbols
@@ -135,7 +136,7 @@ class Routed(_Part):
 
     def curvatures(self) -> ca.Function:
         """As :meth:`.Term.curvatures`; in space assembled from the derivatives of single points."""
-        if not self.space or self.element.strains:
+        if not self.space or self.element.yielding:
             return super().curvatures()
         symbols, q, forward, arm, _ = self._large_symbols()
         weight = ca.MX.sym("weight")

@@ -113,9 +113,6 @@ class Term(Components, abc.ABC):
     on_face: ClassVar[bool] = False
     """Whether its row keeps a place on the surface of an obstacle."""
 
-    from_place: ClassVar[bool] = False
-    """Whether the first of its :attr:`vectors` is relative to its first place in the undeformed scene."""
-
     @property
     def discrete(self) -> Discrete:
         """How the energy-momentum scheme takes derivatives whose work equals the change of energy and rows between two
@@ -131,6 +128,11 @@ class Term(Components, abc.ABC):
     @property
     def vectors(self) -> int:
         """How many vectors its rows begin with that have momentum, centrifugal and Coriolis forces."""
+        return 0
+
+    @property
+    def from_place(self) -> int:
+        """How many of its :attr:`vectors`, the first ones, are relative to its first place in the undeformed scene."""
         return 0
 
     @property

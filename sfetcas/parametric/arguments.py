@@ -111,7 +111,7 @@ class Argument:
         if self.low is not None and self.high is not None:
             return self.low, self.high
         entry = ".law." in self.name and (self.components is not None or self.name[-1].isdigit())
-        signed = entry or ".polynomial" in self.name or ".coupling" in self.name
+        signed = entry or any(part in self.name for part in SIGNED)
         of_section = self.name.startswith("sections.") and not signed
         light = of_section and self.name.split(".")[2] in MAY_BE_ZERO
         if of_section and not light:
@@ -128,6 +128,9 @@ class Argument:
 
 NOT_NEGATIVE = (".stiffness", ".tension", ".pressure", ".area")
 """Ends of the names of numbers that are zero or above."""
+
+SIGNED = (".polynomial", ".coupling", ".stiffness.", ".tension_center", ".shear_center", ".mass_center")
+"""Parts of the names of numbers of sections that may have either sign."""
 
 MAY_BE_ZERO = ("rhoA", "rhoI", "rho", "damping", "drag")
 """Keys of sections whose numbers may be zero."""
@@ -430,6 +433,9 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
     if path[0] == "sections":
         if re.match(r"EI|GJ|coupling", key):
             return "N m2"
+        if key == "stiffness":
+            row, column = (int(part) > 2 for part in [*path[3:5], "0", "0"][:2])
+            return ("N", "N m", "N m2")[row + column]
         if re.match(r"EA|GA", key):
             return "N"
         if key == "shear_factor":

@@ -253,10 +253,10 @@ class Results:
         return section_data(model, member, np.array(self.every[member]), self.model.scales)
 
     def _sections(self, model: Model, member: str) -> Array:
-        """Of a member at its places, (places, 24).
+        """Of a member at its places, (places, 24 or 33).
 
         Compliance matrix times the largest stiffness of the first model, curvature times size, axes b1, b2, b3, and of
-        a shape E and the reach of its fibres.
+        a shape E and the reach of its fibres; where forces bend it, the arms by which they do, m.
         """
         scene, x = model.scene, np.array(self.every[member])
         line, section = scene.center_lines[member], scene.sections[str(scene.members[member].section)]
@@ -264,7 +264,12 @@ class Results:
         axes = np.moveaxis(quaternion.matrix(line.quaternions(x)), 2, 1).reshape(len(x), 9)
         curved = line.curvatures(x) * self.model.scene.size
         fibres = np.zeros((len(x), 3)) if section.shape is None else section.fibres(x)
-        return np.concatenate([soft, curved, axes, fibres], axis=1)
+        arms = [section.arms(x).reshape(len(x), 9)] if section.shifted else []
+        return np.concatenate([soft, curved, axes, fibres, *arms], axis=1)
+
+    def width(self, member: str) -> int:
+        """How many numbers :meth:`rest` has of the section at each place of a member."""
+        return 33 if self.model.scene.members[member].shifted(self.model.scene.sections) else 24
 
     def _stiffness(self, member: str) -> Array:
         """Largest stiffness of the first model at the places of a member, (places,), N m2."""
@@ -276,16 +281,23 @@ class Results:
         """Lengths (elements,) of the elements of a member, dimensionless."""
         return np.asarray(values_of(self.model.beams.weight[self.model.elements_of(member)])).sum(axis=1)
 
-    def bent(self, member: str, moment: ca.MX, axes: Callable[[ca.MX], ca.MX], sections: ca.MX) -> ca.MX:
+    def bent(self, member: str, moment: ca.MX, force: ca.MX, axes: Callable[[ca.MX], ca.MX], sections: ca.MX) -> ca.MX:
         """Change of the curvature about the axes of the sections, (3, places), 1/m.
 
         Parameters
         ----------
-        moment : (3, places), N m, fixed axes
+        moment, force : (3, places), N m and N, fixed axes
         axes : function that rotates vectors (3, places) with the sections
-        sections : (24, places), their data as of :meth:`rest`
+        sections : (24 or 33, places), their data as of :meth:`rest`
         """
-        about = [ca.sum1(axes(sections[12 + 3 * k : 15 + 3 * k, :]) * moment) for k in range(3)]
+        turned = [axes(sections[12 + 3 * k : 15 + 3 * k, :]) for k in range(3)]
+        about = [ca.sum1(axis * moment) for axis in turned]
+        if sections.shape[0] > 24:
+            along = [ca.sum1(axis * force) for axis in turned]
+            about = [
+                own + sum((sections[24 + 3 * i + k, :] * along[i] for i in range(3)), ca.MX(0))
+                for k, own in enumerate(about)
+            ]
         inverse = ca.DM(1.0 / self._stiffness(member)).T
         return ca.vertcat(
             *(sum((sections[3 * k + j, :] * about[j] for j in range(3)), ca.MX(0)) * inverse for k in range(3))
@@ -316,14 +328,14 @@ class _Outputs:
         self._found = found
         count = len(model.nodes)
         along = [len(x) for x in results.every.values()]
-        curved = [24 * len(results.every[name]) for name in results.curved]
+        curved = [results.width(name) * len(results.every[name]) for name in results.curved]
         strung = [results.strung_data(model, name).shape for name in results.strung]
         bounds = np.cumsum([0, 3 * count, *(3 * n for n in along), *curved, *(a * b for a, b in strung)]).tolist()
         nodes, *members = ca.vertsplit(rest, bounds)
         sections = members[len(along) : len(along) + len(curved)]
         pairs = zip(results.strung, strung, members[len(along) + len(curved) :], strict=True)
         self._tendons = {name: ca.reshape(x, shape[1], shape[0]) for name, shape, x in pairs}
-        self._sections = {n: ca.reshape(x, 24, -1) for n, x in zip(results.curved, sections, strict=True)}
+        self._sections = {n: ca.reshape(x, results.width(n), -1) for n, x in zip(results.curved, sections, strict=True)}
         self._rest = ca.reshape(nodes, 3, count)
         self._along = {n: ca.reshape(x, 3, -1) for n, x in zip(results.every, members, strict=False)}
         if expressions.elements:
@@ -473,15 +485,17 @@ class _Outputs:
         """Curvature (places, 3), or strain or stress by its change (places,)."""
 
         def turned(vectors: ca.MX) -> ca.MX:
-            if not self._model.space:
+            space = self._model.space
+            if not space and self._results.width(member) == 24:
                 # About z nothing in the plane counts, and z turns to itself.
                 return vectors
-            function = self._expressions.many(turned_vector(True), vectors.shape[1])
-            return function(self._rotations(member).T, vectors)
+            function, q = self._expressions.many(turned_vector(space), vectors.shape[1]), self._rotations(member).T
+            return function(q, vectors) if space else ca.vertcat(function(q, vectors[:2, :]), vectors[2, :])
 
         moment = self._moment(member) * self._model.scales.moment
+        force = self._force(member) * self._model.scales.force if self._results.width(member) > 24 else moment
         sections, scene = self._sections[member], self._model.scene
-        change = self._results.bent(member, moment, turned, sections)
+        change = self._results.bent(member, moment, force, turned, sections)
         if key == "curvature":
             return (sections[9:12, :] / scene.size + self._natural(member) + change).T
         shape = scene.sections[str(scene.members[member].section)].shape
@@ -566,7 +580,7 @@ class _Outputs:
         if not model.element.strains:
             return ca.MX.zeros(axes, len(at.elements))
         strains = self._places[:, np.maximum(model.segments.strains, 0).ravel().tolist()]
-        columns = ca.vertsplit(self._program.given.compliance, axes)
+        columns = ca.vertsplit(self._program.given.compliance, axes)[:axes]
         gained = sum((ca.repmat(strains[j, :], axes, 1) * column for j, column in enumerate(columns)), ca.MX(0))
         weights = ca.DM(values_of(model.beams.weight).reshape(1, -1))
         return self._points(gained / ca.repmat(weights, axes, 1), member, self._within(member, at.at_points))
