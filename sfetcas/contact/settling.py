@@ -33,6 +33,7 @@ __all__ = [
     "Settler",
     "Way",
     "carried_over",
+    "closed",
     "free_places",
     "moved",
     "placed",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any, final
@@ -30,7 +30,6 @@ __all__ = [
     "Way",
     "check_pieces",
     "check_way",
-    "holes_along",
     "kinks_along",
     "offsets",
     "pieces_of",
@@ -361,12 +360,6 @@ def _apart(a: Hole, b: Hole) -> float:
 
 NEAR = 1e-9
 """Holes of one body nearer than this share of their distance from the centre line are one."""
-
-
-def holes_along(pieces: Iterable[Piece], member: str) -> tuple[float, ...]:
-    """Fractions of the length of a member at which straight pieces begin or end."""
-    ends = [hole for piece in pieces if isinstance(piece, tuple) for hole in piece]
-    return tuple(sorted({hole.at for hole in ends if hole.member == member}))
 
 
 def kinks_along(tendon: Tendon, member: str) -> Iterator[float]:

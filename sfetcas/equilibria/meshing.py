@@ -23,6 +23,9 @@ __all__ = ["PILOT_ELEMENTS", "WHERE", "EquilibriumResult", "Meshing"]
 FINE = 1e-8
 """Below this accuracy elements of order 6 need fewer unknowns than those of order 4 (measured)."""
 
+SHORT = 0.25
+"""Rotation, rad, expected within elements up to which order 4 is as accurate as order 6 (measured)."""
+
 PILOT_ELEMENTS = 60
 """A mesh that was asked for, if no coarser than the first one in space, is its own pilot up to this many elements."""
 
@@ -102,7 +105,7 @@ class Meshing:
             names = {settings.element}
         if len(names) > 1:
             raise SceneError(f"members: found the elements {', '.join(sorted(names))}, accepted: one for all members")
-        name = next(iter(names), "SFET7" if self.accuracy < FINE else "SFET5")
+        name = next(iter(names), "SFET7" if self.accuracy < FINE and not _short(scene) else "SFET5")
         order = ELEMENTS.index(name) + 1
         # A coarser turning an element for low orders: they need more elements to be near at all.
         mesh = first_mesh(scene, order, turning=min(2.0, 0.5 * order))
@@ -157,3 +160,11 @@ class Meshing:
         _ = prepared.equations
         self.seconds["model"] += time.perf_counter() - begin
         return prepared
+
+
+def _short(scene: Scene) -> bool:
+    """Whether holes of tendons make all elements so short that they hardly bend."""
+    if not any(way.holes for tendon in scene.tendons.values() for way in tendon.way):
+        return False
+    usual, finer = (first_mesh(scene, 4, turning=turning) for turning in (2.0, SHORT))
+    return usual.same(finer)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .. import tolerances
+from ..contact.settling import closed
 from ..description.records import counted
 from ..description.supports import free_to_move
 from ..errors import SceneError, SolveError, Status
@@ -114,7 +115,7 @@ class Refinement:
             return source
         prepared = self.meshes.prepared(mesh)
         loading = prepared.model.loading(source.solved.factor)
-        state = transferred(source.solved.model, source.solved.state, prepared.model)
+        state = self._placed(source.solved, prepared, loading)
         solved = self._corrected(prepared, state, loading, source.stability.stable == "neutral")
         if source.kept and not solved.converged:
             solved = deflated(prepared, state, loading, ()) or solved
@@ -134,6 +135,15 @@ class Refinement:
         apart = prepared.distance(state, solved.state) > DRIFT and ELSEWHERE not in source.notes
         notes = (*source.notes, ELSEWHERE) if apart else source.notes
         return replace(source, solved=solved, notes=notes, drifts=drifts, way=way)
+
+    @staticmethod
+    def _placed(source: Solved, prepared: Prepared, loading: Loading) -> State:
+        """The state on another mesh, where holes of tendons may need places that it has not."""
+        state, segments = transferred(source.model, source.state, prepared.model), prepared.model.segments
+        if not source.model.scene.tendons or segments.retained <= {*source.model.segments.retained, *segments.strained}:
+            return state
+        state = prepared.equations.holding(state, loading)
+        return closed(prepared.equations, state, loading, {*source.model.positions.unknowns})
 
     @staticmethod
     def _corrected(prepared: Prepared, state: State, loading: Loading, flat: bool) -> Solved:

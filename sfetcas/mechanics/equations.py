@@ -28,7 +28,7 @@ from .model import Model
 from .reactions import Reactions
 from .rotations import RotationFreedom
 from .tables import Tables
-from .terms import Group, rotation_gradient
+from .terms import Group, pulls_of, rotation_gradient
 
 __all__ = [
     "UNLOADED",
@@ -262,6 +262,30 @@ class Equations:
     def segment_pulls(self, lam: Array, loading: Loading) -> Array:
         """Minus the constant part of the internal force of each segment, (segments, axes), dimensionless."""
         return self._closing_pulls(lam) - self._hanging_pulls(loading)
+
+    def strings(self, state: State, loading: Loading) -> Array:
+        """What strings between nodes of elements take over from these, as a pull, (elements, axes), dimensionless.
+
+        It is linear in the loads and the multipliers.
+        """
+        model = self.model
+        found, first = np.zeros((len(self._owner), model.element.axes)), len(model.positions.rows)
+        if not self._strings:
+            return found
+        places = self.retained_places(state, loading)
+        for number, batch in self._strings.items():
+            group = model.connections[number]
+            lam = state.lam[first + group.labels.ravel()]
+            pull = batch(state.q, places, state.unwrapped, loading.loads[number], lam)[0]
+            for k in range(group.kind.spans):
+                np.add.at(found, group.elements + k, pull)
+        return found
+
+    @functools.cached_property
+    def _strings(self) -> dict[int, GroupBatch]:
+        """Functions of their pulls, by the numbers of their groups."""
+        groups = enumerate(self.model.connections)
+        return {i: GroupBatch(self.model, group, pulls_of(group.kind)) for i, group in groups if group.kind.spans}
 
     def _closing_pulls(self, lam: Array) -> Array:
         positions = self.model.positions

@@ -63,7 +63,17 @@ class Fields:
         gained = (self.turned - model.beams.tangent).sum(axis=1)
         nodal, _ = equations.displacements(state, loading, gained)
         self._nodal = nodal.reshape(len(model.segments.places), -1)
-        self._pull = loading.pull + equations.segment_pulls(state.lam, loading)[model.segments.owner][:, None, :]
+
+    @functools.cached_property
+    def _pull(self) -> Array:
+        """Minus the internal force at the points of elements (elements, points, axes), without that of strings."""
+        carried = self._equations.segment_pulls(self.state.lam, self._loading)[self.model.segments.owner]
+        return np.asarray(self._loading.pull + (carried + self._strings)[:, None, :])
+
+    @functools.cached_property
+    def _strings(self) -> Array:
+        """What strings between nodes of elements take over from these, as a pull, (elements, axes)."""
+        return self._equations.strings(self.state, self._loading)
 
     @functools.cached_property
     def balance(self) -> Balance:
@@ -736,9 +746,11 @@ class Fields:
             # Section axes that have inertia give moments to all nodes.
             gains -= self._loading.moment[chain[:, 1:-1]].sum(axis=1)
         moments = -self.balance.start_moment(member) + np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
-        if any(touch.to is not None for touch in model.mesh.touches):
-            # An obstacle along a stretch gives couples that no loading knows: the elements say what reaches them.
-            moments[:-1] = -self.balance.starting_moments(part)
+        strings = self._strings[part]
+        if strings.any() or any(touch.to is not None for touch in model.mesh.touches):
+            # An obstacle along a stretch and a string give couples that no loading knows: the elements say what reaches
+            # them.
+            moments[:-1] = -self.balance.starting_moments(part) - _cross(self.turned[part, 0], strings)
         return np.asarray(moments)
 
 

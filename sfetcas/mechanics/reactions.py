@@ -279,7 +279,7 @@ class Reactions:
         """Group, number and side of all that takes a moment at a node but members."""
         found: dict[str, list[tuple[int, int, int]]] = {}
         for number, group in enumerate(self.model.terms[1:], start=1):
-            own = group.kind.table == "members" or group.kind.along_element
+            own = group.kind.table == "members" or group.kind.along_element or group.kind.spans
             for i, side in np.argwhere(group.turns != GROUND).tolist() if not own else ():
                 node = self.model.segments.places[group.places[i, side]] if group.kind.apart else group.nodes[i]
                 found.setdefault(self._ending.get(node, node), []).append((number, i, side))
@@ -304,16 +304,18 @@ class Reactions:
     def _on_element(self, element: int, k: int) -> Iterator[Index]:
         """Cells on a node of an element, of loads along it too."""
         yield self._cell(0, element, k)
-        for number, i in self._along.get(element, ()):
-            yield self._cell(number, i, k)
+        for number, i, first in self._along.get(element, ()):
+            yield self._cell(number, i, first + k)
 
     @functools.cached_property
-    def _along(self) -> dict[int, list[tuple[int, int]]]:
-        """Group and number of the loads and tendons along elements."""
-        found: dict[int, list[tuple[int, int]]] = {}
+    def _along(self) -> dict[int, list[tuple[int, int, int]]]:
+        """Group, number, and the side that is the first node of the element, of loads and tendons along elements."""
+        found: dict[int, list[tuple[int, int, int]]] = {}
         for number, group in enumerate(self.model.terms):
-            for i, element in enumerate(group.elements.tolist() if group.kind.along_element else ()):
-                found.setdefault(element, []).append((number, i))
+            count = 1 if group.kind.along_element else group.kind.spans
+            for i, element in enumerate(group.elements.tolist() if count else ()):
+                for k in range(count):
+                    found.setdefault(element + k, []).append((number, i, k * self.model.element.order))
         return found
 
     @functools.cached_property

@@ -15,13 +15,18 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..description.structure import SLIDING
-from ..description.tendons import holes_along
+from ..description.tendons import Hole, Piece
 from ..mathematics import interpolation
 from ..mathematics.arrays import Array, Index
 from .mesh import Mesh
 from .rotations import end_joints
 
-__all__ = ["Segment", "Segments", "cushioned", "cut_members", "elongation_of"]
+__all__ = ["MOST_COUPLED", "Segment", "Segments", "cushioned", "cut_members", "elongation_of", "spanned"]
+
+MOST_COUPLED = 20
+"""Rotations and strains at most that the length between two holes of a tendon couples: of more, places of the holes are
+less work (measured).
+"""
 
 
 @dataclass(frozen=True)
@@ -113,8 +118,35 @@ def elongation_of(tendon: str) -> str:
     return f"elongation of tendons.{tendon}"
 
 
-def _retained_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
+def spanned(scene: Scene, mesh: Mesh, piece: Piece) -> range:
+    """Numbers, along their member, of the elements between two holes of a tendon that need no places; else none.
+
+    The holes are in one flexible member, with few elements between them, which integrate at their nodes.
+    """
+    if mesh.places or mesh.gauss or not isinstance(piece, tuple):
+        return range(0)
+    first, last = piece
+    member = first.member
+    if member is None or member != last.member or scene.members[member].type != "flexible":
+        return range(0)
+    between = range(*sorted(mesh.cut_at(member, hole.at) for hole in piece))
+    coupled = len(between) * mesh.order + 1
+    if scene.stretches:
+        coupled += len(between) * (mesh.order + 1)
+    return between if coupled <= MOST_COUPLED else range(0)
+
+
+def _placed(scene: Scene, mesh: Mesh) -> Iterator[Hole]:
+    """The holes of tendons that need places: the ends of straight pieces that are no function of rotations alone."""
+    for pieces in scene.tendon_pieces.values():
+        for piece in pieces:
+            if isinstance(piece, tuple) and not spanned(scene, mesh, piece):
+                yield from piece
+
+
+def _retained_cuts(scene: Scene, mesh: Mesh, member: str) -> list[int]:
     """Inner cuts of a member that are needed as places of their own: holes of tendons, and loads that turn with it."""
+    cuts = mesh.cuts[member]
     inner = range(1, len(cuts) - 1)
     if member in _pushed(scene):
         return list(inner)
@@ -122,8 +154,7 @@ def _retained_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
     spread = [load.part for load in following if load.type == "distributed"]
     wanted = {cut for a, b in spread for cut in range(_nearest(cuts, a), _nearest(cuts, b) + 1)}
     wanted |= {_nearest(cuts, load.at or 0.0) for load in following if load.type != "distributed"}
-    for pieces in scene.tendon_pieces.values():
-        wanted |= {_nearest(cuts, at) for at in holes_along(pieces, member)}
+    wanted |= {_nearest(cuts, hole.at) for hole in _placed(scene, mesh) if hole.member == member}
     return [cut for cut in inner if cut in wanted]
 
 
@@ -139,7 +170,7 @@ def _pushed(scene: Scene) -> set[str | None]:
     return {magnet.node if magnet.member is None else magnet.member for magnet in scene.magnets.values()}
 
 
-def _sprung(scene: Scene) -> Iterator[str]:
+def _sprung(scene: Scene, mesh: Mesh) -> Iterator[str]:
     """Nodes whose displacement springs, tendons, small members and magnets act upon, and first nodes of what follows
     its section.
     """
@@ -148,10 +179,9 @@ def _sprung(scene: Scene) -> Iterator[str]:
     for name in scene.members:
         if name in pushed:
             yield from scene.members[name].nodes
-    for pieces in scene.tendon_pieces.values():
-        for hole in (hole for piece in pieces if isinstance(piece, tuple) for hole in piece):
-            yield from [hole.node] if hole.node is not None else []
-            yield from scene.members[hole.member].nodes if hole.member is not None else ()
+    for hole in _placed(scene, mesh):
+        yield from [hole.node] if hole.node is not None else []
+        yield from scene.members[hole.member].nodes if hole.member is not None else ()
     for spring in scene.springs.values():
         if spring.type == "translational":
             yield from (node for node in (spring.node, spring.to) if node is not None)
@@ -181,7 +211,7 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
         cuts = mesh.cuts[name]
         touched, last = _touched(mesh, name), len(cuts) - 1
         retained |= {ends[name, i] for i, cut in enumerate((0, last)) if cut in touched}
-        inner = range(1, last) if mesh.places and member.type == "flexible" else _retained_cuts(scene, name, cuts)
+        inner = range(1, last) if mesh.places and member.type == "flexible" else _retained_cuts(scene, mesh, name)
         stops = [0, *sorted({*inner, *touched} - {0, last}), last]
         here = ends[name, 0]
         for a, b in zip(stops, stops[1:], strict=False):
@@ -198,7 +228,7 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
             retained.add(elongation_of(name))
     # Turning axes act upon all that has mass.
     retained |= set(scene.nodes) if scene.rotating is not None else set()
-    retained |= set(_sprung(scene)) | {load.node for load in scene.loads.values() if load.follows and load.node}
+    retained |= set(_sprung(scene, mesh)) | {load.node for load in scene.loads.values() if load.follows and load.node}
     sizes = [part.elements.stop - part.elements.start for part in parts]
     owner = np.repeat(np.arange(len(parts)), sizes)
     strains, strained = _strained(scene, mesh, len(places), len(owner))

@@ -14,7 +14,7 @@ from ..mathematics.arrays import Index
 from ..mathematics.constants import picked, sparse, times
 from .expressions import Expressions, Given
 from .tables import Places
-from .terms import rotation_forces, rotation_gradient
+from .terms import pulls_of, rotation_forces, rotation_gradient
 
 __all__ = ["Forces", "Stationarity", "summed"]
 
@@ -67,6 +67,7 @@ class Stationarity:
         self.entries: list[ca.MX] = []
         self.on_places, rows = forces.on_places - given.force, list[tuple[int, ca.MX]]()
         self.rotation_jacobian = ca.MX(expressions.axes, 0)
+        self._strings: list[tuple[Index, ca.MX]] = []
         for number, group in enumerate(model.terms):
             n, function = len(group.data), rotation_gradient(group.kind) if entries else rotation_forces(group.kind)
             if not n:
@@ -78,6 +79,9 @@ class Stationarity:
             ]
             if number == 0:
                 arguments[3] += ca.reshape(ca.MX(forces.pull) + ca.MX.zeros(given.pull.shape), *arguments[3].shape)
+            if group.kind.spans:
+                elements = group.elements[:, None] + np.arange(group.kind.spans)
+                self._strings.append((elements, expressions.many(pulls_of(group.kind), n)(*arguments)))
             found = expressions.many(function, n)(*arguments)
             gaps, acting, *stiff = found[2:] if entries else found
             self.shares.append((tables.sides[number], acting))
@@ -104,6 +108,18 @@ class Stationarity:
         constant = expressions.multipliers(0, self._lam)
         each = np.repeat(np.arange(expressions.elements), expressions.points)
         return own + constant[:, each.tolist()]
+
+    @property
+    def strings(self) -> ca.MX:
+        """What strings between nodes of elements take over from these, as a pull, (axes, elements)."""
+        expressions = self._expressions
+        found = ca.MX(expressions.axes, expressions.elements)
+        for elements, pull in self._strings:
+            n, count = elements.shape
+            every = np.repeat(np.arange(n), count)
+            onto = sparse(every, elements.ravel(), np.ones(n * count), (n, expressions.elements))
+            found += ca.mtimes(pull, onto)
+        return found
 
     def moments(self, nodes: Index) -> ca.MX:
         """Moments (turns, n) that elements, and what acts along them, take from given nodes of elements."""

@@ -20,19 +20,26 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, Literal, final
 
 import casadi as ca
 import numpy as np
 
 from ..description.tendons import Hole, Stretch, Tendon, tangent
 from ..mathematics.arrays import Array, numbers
+from ..mathematics.quaternion import product
 from .elements import Element
 from .parts import Parts
-from .segments import elongation_of
+from .segments import elongation_of, spanned
 from .terms import ARGUMENTS, GROUND, One, Side, Term, name_of
 
-__all__ = ["Elongation", "Routed", "Strung", "tendons_in"]
+__all__ = ["Elongation", "Routed", "Spanned", "Strung", "tendons_in"]
+
+_Chart = Literal["vectors", "components"]
+"""Derivatives by rotations: by vectors about the fixed axes, or by components of quaternions."""
+
+_WIDTHS: Mapping[_Chart, int] = {"vectors": 3, "components": 4}
+"""Numbers of a rotation in space."""
 
 
 @dataclass(frozen=True)
@@ -196,6 +203,232 @@ class Strung(_Part):
 
 @final
 @dataclass(frozen=True)
+class Spanned(_Part):
+    """A straight piece between two holes of a member, over the elements between them.
+
+    The vector from hole to hole gains ``sum (R(q) - I) w`` over the points of the elements: ``w`` is the tangent of a
+    point, at the first one less the arm of the hole there, at the last one with the arm of the other hole.
+
+    Data: vector from hole to hole at rest; the vectors ``w``, and the compliances of the points.
+
+    Attributes
+    ----------
+    element : Element
+        It integrates at its nodes.
+    count : int
+        Number of the elements.
+    """
+
+    element: Element
+    count: int
+
+    @property
+    def spans(self) -> int:
+        """The elements between the holes."""
+        return self.count
+
+    @property
+    def nodes(self) -> int:
+        """Number of their nodes."""
+        return self.count * self.element.order + 1
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """The rotations of the elements, and their strains."""
+        strains, points = self.count * self.element.sizes[1], len(self._node_of)
+        data = self.axes + points * (self.axes + self.element.compliances)
+        return self.nodes, strains, int(self.given), data + 2, 1
+
+    def length(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
+        """Distance of the holes."""
+        return ca.norm_2(self.vector(q, u, data))
+
+    def pull(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The tension, from the first hole to the last one."""
+        vector = self.vector(q, u, data)
+        return ca.vertsplit((lam if self.given else load) / ca.norm_2(vector) * vector)
+
+    def vector(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
+        """From the first hole to the last one."""
+        start, rest, compliance = self._split(data)
+        total = start
+        for k, node in enumerate(self._node_of):
+            strain = ca.vertcat(ca.SX(0, 1), *(u[k] if u else []))
+            total += self._gained(q[node], rest[:, k], strain, compliance[:, k])
+        return total
+
+    def _gained(self, side: Side, rest: ca.SX, strain: ca.SX, compliance: ca.SX) -> ca.SX:
+        """What one point adds to the vector between the holes by its rotation and, where it has some, its strain."""
+        opposite = [side[0], *[-part for part in side[1:]]] if self.space else [-side[0]]
+        gained = ca.vertcat(*self.turned_back(opposite, ca.vertsplit(rest)))
+        if not strain.numel():
+            return gained
+        more = self.element.strained(ca.SX.zeros(self.axes), compliance, strain)
+        return gained + ca.vertcat(*self.forth(side, ca.vertsplit(more)))
+
+    def _split(self, data: Any) -> tuple[Any, Any, Any]:
+        """The vector between the holes at rest; vectors and compliances of the points, a column for each."""
+        axes, n, size = self.axes, len(self._node_of), self.element.compliances
+        start, rest, compliance, _ = ca.vertsplit(data, np.cumsum([0, axes, n * axes, n * size, 2]).tolist())
+        return start, ca.reshape(rest, axes, n), ca.reshape(compliance, size, n)
+
+    @functools.cached_property
+    def _node_of(self) -> list[int]:
+        """Number of the node at which each point is: where elements meet there are two, without strains their sum."""
+        order = self.element.order
+        if not self.element.strains:
+            return list(range(self.nodes))
+        return [element * order + k for element in range(self.count) for k in range(order + 1)]
+
+    # In space derivatives of single points, mapped over the points and put together by constant matrices, as the length
+    # is a function of a sum over the points.
+
+    def rotation_gradient(self) -> ca.Function:
+        """As :meth:`.Term.rotation_gradient`; in space assembled from the derivatives of single points."""
+        if not self.space:
+            return super().rotation_gradient()
+        symbols, tension, change, by_sides = self._large("vectors", "hessian")
+        slope, hessian, load = by_sides[0], by_sides[1], symbols[3]
+        results = {
+            "energy": ca.MX.zeros(1) if self.given else load * change,
+            "stored": ca.MX.zeros(1),
+            "rows": change + load if self.given else ca.MX(0, 1),
+            "gradient": tension * slope,
+            "stiffness": tension * hessian,
+            "rotation_jacobian": slope.T if self.given else ca.MX(0, slope.shape[0]),
+        }
+        return self._function("rotation_gradient", symbols, results)
+
+    def rotation_forces(self) -> ca.Function:
+        """As :meth:`.Term.rotation_forces`; in space assembled from the derivatives of single points."""
+        if not self.space:
+            return super().rotation_forces()
+        symbols, tension, change, (slope,) = self._large("vectors", "gradient")
+        rows = change + symbols[3] if self.given else ca.MX(0, 1)
+        return self._function("forces", symbols, {"rows": rows, "gradient": tension * slope})
+
+    def slopes(self) -> ca.Function:
+        """As :meth:`.Term.slopes`; in space assembled from the derivatives of single points."""
+        if not self.space:
+            return super().slopes()
+        symbols, _, _, (slope,) = self._large("components", "gradient")
+        results = {
+            "gradient": ca.MX.zeros(slope.shape[0]) if self.given else symbols[3] * slope,
+            "jacobian": slope.T if self.given else ca.MX(0, slope.shape[0]),
+        }
+        return self._function("slopes", symbols[:4], results)
+
+    def curvatures(self) -> ca.Function:
+        """As :meth:`.Term.curvatures`; in space assembled from the derivatives of single points."""
+        if not self.space:
+            return super().curvatures()
+        symbols, tension, _, (_, hessian) = self._large("components", "hessian")
+        weight = ca.MX.sym("weight")
+        found = (tension if self.given else weight * tension) * hessian
+        return self._function("curvatures", [*symbols, weight], {"hessian": found})
+
+    def _function(self, name: str, symbols: list[ca.MX], results: dict[str, ca.MX]) -> ca.Function:
+        names = [*ARGUMENTS, "weight"][: len(symbols)]
+        values = [ca.densify(part) for part in results.values()]
+        return ca.Function(f"{name}_{name_of(self)}", symbols, values, names, list(results))
+
+    def _large(self, chart: _Chart, wanted: str) -> tuple[list[ca.MX], ca.MX, ca.MX, list[ca.MX]]:
+        """Symbols, tension, change of the length, and its derivatives by all rotations, then by all strains.
+
+        By rotation vectors about the fixed axes, as :func:`.rotation_gradient` says, or by components; to the second
+        ones for ``hessian``.
+        """
+        turns, places, rows, count, load = self.sizes
+        shapes = ((4, turns), (3, places), (count, 1), (load, 1), (rows, 1))
+        symbols = [ca.MX.sym(name, *shape) for name, shape in zip(ARGUMENTS, shapes, strict=True)]
+        q, u, data = symbols[:3]
+        n = len(self._node_of)
+        start, rest, compliance = self._split(data)
+        given = [q[:, self._node_of], rest, *([u, compliance] if places else [])]
+        vector = start + ca.sum2(self._point(chart, "value").map(n)(*given))
+        length, unit, across = self._norm(vector)
+        jacobians = self._point(chart, "gradient").map(n)(*given)
+        jacobian = self._by_sides(jacobians if places else [jacobians], chart)
+        by_sides = [ca.mtimes(jacobian.T, unit)]
+        if wanted == "hessian":
+            curved = self._point(chart, "hessian").map(n)(*given, ca.repmat(unit, 1, n))
+            entries = ca.vertcat(*[ca.vec(part) for part in (curved if places else [curved])])
+            total = jacobian.shape[1]
+            summed = ca.reshape(ca.mtimes(self._onto_sides(chart), entries), total, total)
+            by_sides.append(ca.mtimes(jacobian.T, ca.mtimes(across, jacobian)) + summed)
+        tension = symbols[4] if self.given else symbols[3]
+        return symbols, tension, length - data[count - 2], by_sides
+
+    def _by_sides(self, jacobians: list[ca.MX], chart: _Chart) -> ca.MX:
+        """Derivatives of the vector by all sides from those by the rotations of the points and by their strains."""
+        points, width = len(self._node_of), _WIDTHS[chart]
+        at = ca.DM.triplet(list(range(points)), self._node_of, ca.DM.ones(points), points, self.nodes)
+        return ca.horzcat(ca.mtimes(jacobians[0], ca.kron(at, ca.DM.eye(width))), *jacobians[1:])
+
+    def _onto_sides(self, chart: _Chart) -> ca.DM:
+        """Matrix from the second derivatives of the points, those by rotations, then mixed ones, to those by all sides.
+
+        What is added is linear in the strains, so that second derivatives by these vanish.
+        """
+        points, width = len(self._node_of), _WIDTHS[chart]
+        strained = width * self.nodes
+        total = strained + 3 * self.sizes[1]
+        turned = width * np.array(self._node_of)[:, None] + np.arange(width)
+        row, column = np.repeat(turned, width, axis=0).ravel(), np.repeat(turned.ravel(), width)
+        places, entries = column * total + row, np.arange(points * width**2)
+        if self.sizes[1]:
+            # Entries of a point column by column: of each strain by all components of the rotation.
+            row = np.repeat(turned, 3, axis=0).ravel()
+            column = np.repeat(strained + np.arange(3 * points), width)
+            mixed = len(entries) + np.arange(len(row))
+            places = np.concatenate([places, column * total + row, row * total + column])
+            entries = np.concatenate([entries, mixed, mixed])
+        size = points * width**2 + (3 * width * points if self.sizes[1] else 0)
+        return ca.DM.triplet(places.tolist(), entries.tolist(), ca.DM.ones(len(places)), total**2, size)
+
+    @functools.cached_property
+    def _norm(self) -> ca.Function:
+        """A vector -> its length, and the first and second derivatives of that."""
+        vector = ca.SX.sym("vector", self.axes)
+        hessian, gradient = ca.hessian(ca.norm_2(vector), vector)
+        results = [ca.norm_2(vector), gradient, ca.densify(hessian)]
+        return ca.Function("norm", [vector], results, {"cse": True})
+
+    def _point(self, chart: _Chart, wanted: str) -> ca.Function:
+        """Arguments of a point -> what it adds, or derivatives of that by its rotation and its strain.
+
+        The second ones along a direction, a further argument: by the rotation, and by both.
+        """
+        strains = 3 if self.element.strains else 0
+        sizes = {"q": 4, "rest": 3, "strain": strains, "compliance": self.element.compliances, "unit": 3}
+        symbols = [ca.SX.sym(name, size) for name, size in sizes.items() if size]
+        q, rest, unit = symbols[0], symbols[1], symbols[-1]
+        strain, compliance = symbols[2:4] if strains else (ca.SX(0, 1), ca.SX(0, 1))
+        gained = self._gained(ca.vertsplit(q), rest, strain, compliance)
+        basis = ca.SX.eye(4)
+        if chart == "vectors":
+            columns = [ca.vertcat(*product([0.0, *axis], ca.vertsplit(q))) for axis in np.eye(3).tolist()]
+            basis = 0.5 * ca.horzcat(*columns)
+        if wanted == "value":
+            results = [gained]
+        elif wanted == "gradient":
+            by_strain = [ca.jacobian(gained, strain)] if strains else []
+            results = [ca.mtimes(ca.jacobian(gained, q), basis), *by_strain]
+        else:
+            hessian, slope = ca.hessian(ca.dot(unit, gained), q)
+            curved = ca.mtimes(basis.T, ca.mtimes(hessian, basis))
+            if chart == "vectors":
+                # What keeps quaternions on the unit sphere.
+                curved -= 0.25 * ca.dot(q, slope) * ca.SX.eye(3)
+            mixed = [ca.mtimes(basis.T, ca.jacobian(slope, strain))] if strains else []
+            results = [curved, *mixed]
+        given = symbols if wanted == "hessian" else symbols[:-1]
+        name = f"point_{wanted}_{chart}"
+        return ca.Function(name, given, [ca.densify(part) for part in results], {"cse": True})
+
+
+@final
+@dataclass(frozen=True)
 class Elongation(Term):
     """What an elastic tendon is longer than its free length: the first displacement of a place; data: stiffness.
 
@@ -253,7 +486,8 @@ class _Maker:
         found, still = list[One](), 0.0
         for piece in scene.tendon_pieces[self.name]:
             if isinstance(piece, tuple):
-                found.append(self._strung(*piece))
+                between = spanned(scene, self.parts.mesh, piece)
+                found.append(self._spanned(piece, between) if between else self._strung(*piece))
             elif scene.members[piece.member].type == "rigid":
                 still = still + _length(piece, scene.center_lines[piece.member]) / scales.length
             else:
@@ -297,6 +531,28 @@ class _Maker:
         data = np.concatenate([gap, *arms, np.reshape(numbers(np.linalg.norm(gap)), (1,)), np.zeros(1)])
         turns, places = (self._turn(first), self._turn(last)), (self._place(first), self._place(last))
         return One(Strung(space, self.given), self.name, "", numbers(data), turns, places, self._row)
+
+    def _spanned(self, piece: tuple[Hole, Hole], between: range) -> One:
+        """A piece between two holes of a member, from that with the smaller fraction."""
+        parts, unit, axes = self.parts, self.parts.scales.length, self.axes
+        first, last = sorted(piece, key=lambda hole: hole.at)
+        start = parts.beams.first[str(first.member)] + between.start
+        elements = slice(start, start + len(between))
+        kind = Spanned(parts.element.space, self.given, parts.element, len(between))
+        gap, *arms = (numbers(v[:axes] / unit) for v in (last.position - first.position, first.arm, last.arm))
+        vectors: list[Array] = []
+        for number in range(elements.start, elements.stop):
+            own = [parts.beams.tangent[number, k] for k in range(parts.element.order + 1)]
+            if vectors and not kind.element.strains:
+                own[0] = own[0] + vectors.pop()
+            vectors += own
+        vectors[0], vectors[-1] = vectors[0] - arms[0], vectors[-1] + arms[1]
+        yielding = parts.beams.compliance[elements].ravel()
+        rest = np.reshape(numbers(np.linalg.norm(gap)), (1,))
+        data = np.concatenate([gap, *vectors, yielding, rest, np.zeros(1)])
+        turns = tuple(parts.rotations.chain(elements).tolist())
+        places = tuple(parts.segments.strains[elements].ravel().tolist())
+        return One(kind, self.name, "", numbers(data), turns, places, self._row, element=start)
 
     @property
     def _row(self) -> str:

@@ -41,6 +41,7 @@ __all__ = [
     "energies_of",
     "grouped",
     "name_of",
+    "pulls_of",
     "rotation_forces",
     "rotation_gradient",
     "rows_of",
@@ -112,6 +113,14 @@ class Term(Components, abc.ABC):
 
     on_face: ClassVar[bool] = False
     """Whether its row keeps a place on the surface of an obstacle."""
+
+    @property
+    def spans(self) -> int:
+        """Along how many elements it is a string between two of their nodes, whose pull they do not carry; else 0.
+
+        They are that of :attr:`One.element` and the next ones, whose rotations are its sides.
+        """
+        return 0
 
     @property
     def discrete(self) -> Discrete:
@@ -201,6 +210,10 @@ class Term(Components, abc.ABC):
         """
         return None
 
+    def pull(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """Of a kind with :attr:`spans`: the force (axes,) along it, which their internal force lacks, fixed axes."""
+        return []
+
     def efforts(self, data: ca.SX, load: ca.SX) -> tuple[Any, ca.SX]:
         """The element on whose strains it acts, and the derivatives (turns, points) of the energy by its curvatures
         times its length, see :attr:`discrete`.
@@ -282,7 +295,7 @@ class One:
     loads : mapping of str or None to ndarray (loads,)
         Data that grow with a history, or with the load factor (None), at factor 1, beside the loads of the scene.
     element : int
-        Number of the element whose rotations are its sides; -1 where there is none.
+        Number of the element whose rotations are its sides, or of the first of them; -1 where there is none.
     """
 
     kind: Term
@@ -318,7 +331,7 @@ class Group:
     labels : ndarray (n, rows)
         Numbers of the rows of each term among those of all groups beside the elements.
     elements : ndarray (n,)
-        Numbers of the elements whose rotations are the sides; -1 where there is none.
+        Numbers of the elements whose rotations are the sides, or of the first of each; -1 where there is none.
     """
 
     kind: Term
@@ -549,6 +562,14 @@ def answers_of(kind: Term) -> ca.Function:
     found = kind.answer(*sides, *arguments[2:])
     name = f"answers_{name_of(kind)}"
     return ca.Function(name, arguments, [ca.densify(ca.vertcat(ca.SX(0, 1), *found))], [*ARGUMENTS], ["answers"])
+
+
+@functools.cache
+def pulls_of(kind: Term) -> ca.Function:
+    """``(q, u, data, load, lam) ->`` force (axes,) along a string between two nodes of elements, fixed axes."""
+    arguments, sides = _symbols(kind)
+    found = ca.densify(ca.vertcat(ca.SX(0, 1), *kind.pull(*sides, *arguments[2:])))
+    return _shared(f"pulls_{name_of(kind)}", arguments, [found], [*ARGUMENTS], ["pull"])
 
 
 @functools.cache

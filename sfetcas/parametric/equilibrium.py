@@ -126,7 +126,8 @@ class EquilibriumSolver:
         p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
         given = np.array(self.prepare(p)).ravel()
         good = self.arguments.accepted(p)
-        outcome = self.method(given if good else given * np.nan, self.start if start is None else start)
+        begin = self.start if start is None else start
+        outcome = self.method(given if good else given * np.nan, begin, warm=start is not None)
         nothing = np.full(self.results.size, np.nan)
         if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
             return outcome, nothing

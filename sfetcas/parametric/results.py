@@ -537,7 +537,12 @@ class _Outputs:
     def _spread(self) -> tuple[ca.MX, ca.MX, ca.MX]:
         """Distributed forces at the points of all elements, the whole pull there (axes, points), couples of loads."""
         spread, pull, torque = spread_of(self._expressions, self._q, self._y, self._program.given)
-        return spread, self._found.pull + pull, torque
+        return spread, self._found.pull + pull + self._on_points(self._found.strings), torque
+
+    def _on_points(self, values: ca.MX) -> ca.MX:
+        """What is the same all along each element, (axes, elements), at its points."""
+        each = np.repeat(np.arange(self._expressions.elements), self._expressions.points)
+        return values[:, each.tolist()]
 
     def _force(self, member: str) -> ca.MX:
         """Internal force at the places, (3, places)."""
@@ -589,14 +594,18 @@ class _Outputs:
         """Moment through cuts, (3, places): that at the first node of the element, and what forces add."""
         expressions, model = self._expressions, self._model
         at = self._stations(member)
-        own = self._found.moments(expressions.points * (model.elements_of(member).start + at.elements))
+        first = expressions.points * (model.elements_of(member).start + at.elements)
+        own = self._found.moments(first)
         _, pull, torque = self._spread
-        if model.space:
-            crossed = ca.cross(self._tangents, pull, 1)
-        else:
-            crossed = self._tangents[0, :] * pull[1, :] - self._tangents[1, :] * pull[0, :]
-        gained = self._points(crossed - torque, member, self._within(member, at.gained)) - own
+        own += self._crossed(self._on_points(self._found.strings))[:, first.tolist()]
+        gained = self._points(self._crossed(pull) - torque, member, self._within(member, at.gained)) - own
         return self._about(gained)
+
+    def _crossed(self, pull: ca.MX) -> ca.MX:
+        """Cross products of the tangents of all points with what pulls there, (turns, points)."""
+        if self._model.space:
+            return ca.cross(self._tangents, pull, 1)
+        return self._tangents[0, :] * pull[1, :] - self._tangents[1, :] * pull[0, :]
 
     # -- springs ------------------------------------------------------------------------------------
 

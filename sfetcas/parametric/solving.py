@@ -200,7 +200,7 @@ class ParametricEquilibrium:
     def _outcome(self, numbers: Array, state: Array | None) -> Outcome:
         solver = self.solver
         given = np.array(solver.prepare(numbers)).ravel()
-        return solver.method(given, solver.start if state is None else state)
+        return solver.method(given, solver.start if state is None else state, warm=state is not None)
 
     @functools.cached_property
     def implicit(self) -> Implicit:

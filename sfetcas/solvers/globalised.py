@@ -5,7 +5,7 @@ energy on the closings remains.  Where the energy is not convex on them, which t
 matrix show (Sylvester), positive matrices replace those of the elements, and the diagonal is shifted until the signs
 are right; steps are shortened until potential and gaps fall.  Near the answer steps are taken whole.  Unstable
 equilibria are left along the lowest mode.  Loads without potential, and cases in which no minimum is found, are
-followed from zero loads.
+followed from zero loads.  From an equilibrium for other values Newton's whole steps are tried first.
 
 Every operation on numbers is one of the functions of :class:`~sfetcas.solvers.program.Program`; generated C takes the
 same decisions on the same numbers, with the same :class:`Rules`.
@@ -308,7 +308,7 @@ class Globalised:
 
     # Overflow is detected by results that are not finite, as in C.
     @np.errstate(over="ignore", invalid="ignore")
-    def __call__(self, given: Array, start: Array | None = None) -> Outcome:
+    def __call__(self, given: Array, start: Array | None = None, *, warm: bool = False) -> Outcome:
         """Solve for an equilibrium.
 
         Parameters
@@ -317,6 +317,8 @@ class Globalised:
             Loads and data that vary, dimensionless, see :meth:`~sfetcas.solvers.program.Program.given_of`.
         start : ndarray (states,), optional
             State to begin with; the undeformed one by default.
+        warm : bool
+            Whether that is an equilibrium for other values, from which whole steps are tried first.
         """
         program, rules = self.program, self.rules
         if not np.isfinite(given).all() or (start is not None and not np.isfinite(start).all()):
@@ -324,13 +326,24 @@ class Globalised:
         self._left = rules.iterations
         self._free = not given[program.slice_of_moments].any()
         whole = ca.DM(given)
-        found = self._from(program.begin(whole) if start is None else program.hold(start, whole), whole)
+        state = program.begin(whole) if start is None else program.hold(start, whole)
+        found = self._near(state, whole) if warm else None
+        found = found or self._from(state, whole)
         if found.code not in (Code.SOLVED, Code.UNSTABLE) and self._left:
             followed = self._followed(given)
             found = followed if followed.code is Code.SOLVED else found
         if found.code in (Code.SOLVED, Code.UNSTABLE) and not np.isfinite(found.state).all():
             found = replace(found, code=Code.NOT_FINITE)
         return replace(found, iterations=rules.iterations - self._left)
+
+    def _near(self, state: ca.DM, given: ca.DM) -> Outcome | None:
+        """By whole steps to an equilibrium that need not be left; None where they do not lead to one."""
+        found = self._corrected(self._at(state, given), given, self.rules.corrections)
+        if found.code is not Code.SOLVED:
+            return None
+        if found.negative <= 0 or not self.program.model.minimisable:
+            return found
+        return None if self.rules.escapes else replace(found, code=Code.UNSTABLE)
 
     def _from(self, state: ca.DM, given: ca.DM) -> Outcome:
         """Downhill from a state to an equilibrium, and on from unstable ones, ``escapes`` times."""

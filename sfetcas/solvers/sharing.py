@@ -95,11 +95,13 @@ def _axial(equations: Equations, state: State, loading: Loading, loose: Array, r
     chosen = np.array(kinds, dtype=bool)[model.segments.owner]
     along = (turned_tangents(model, state) / np.sqrt(model.beams.weight)[..., None])[chosen]
 
-    def force(pulls: Array, spread: Array | float = 0.0) -> Array:
-        return np.asarray(((spread + pulls[model.segments.owner[chosen]][:, None, :]) * along).sum(axis=2).ravel())
+    def force(lam: Array, loading: Loading, spread: Array | float = 0.0) -> Array:
+        pulls = equations.segment_pulls(lam, loading)[model.segments.owner]
+        pulls = (pulls + equations.strings(replace(state, lam=lam), loading))[chosen]
+        return np.asarray(((spread + pulls[:, None, :]) * along).sum(axis=2).ravel())
 
-    own = force(equations.segment_pulls(state.lam, acting), acting.pull[chosen])
-    gains = [force(equations.segment_pulls(way, nothing)) for way in loose.T]
+    own = force(state.lam, acting, acting.pull[chosen])
+    gains = [force(way, nothing) for way in loose.T]
     return own, np.array(gains).reshape(loose.shape[1], len(own)).T
 
 

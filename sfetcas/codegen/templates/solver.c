@@ -322,6 +322,19 @@ static int sf_corrected(sf_run *run, sf_here *here, sf_here *there, int most, in
   return here->size <= SF_CONVERGED ? @NAME@_SOLVED : @NAME@_ITERATIONS;
 }
 
+/* By whole steps to an equilibrium that need not be left. */
+static int sf_near(sf_run *run, sf_here *here, sf_here *there, int *negative, int *status) {
+  *status = sf_corrected(run, here, there, SF_CORRECTIONS, negative);
+  if (*status != @NAME@_SOLVED) return 0;
+#if SF_MINIMISABLE
+  if (*negative > 0) {
+    *status = @NAME@_UNSTABLE;
+    return SF_ESCAPES == 0;
+  }
+#endif
+  return 1;
+}
+
 /* Downhill from a state, and out of what is unstable. */
 static int sf_from(sf_run *run, sf_here *here, sf_here *there, int *negative) {
 #if SF_MINIMISABLE
@@ -404,7 +417,10 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
       sf_call(m, @name@_hold, sf_start, m->given, 0, here.state);
     else
       sf_call(m, @name@_begin, m->given, 0, 0, here.state);
-    status = sf_from(&run, &here, &there, &negative);
+    if (!warm || !sf_near(&run, &here, &there, &negative, &status)) {
+      if (warm) sf_call(m, @name@_hold, state, m->given, 0, here.state);
+      status = sf_from(&run, &here, &there, &negative);
+    }
     if (status != @NAME@_SOLVED && status != @NAME@_UNSTABLE && run.left) {
       sf_here first = here;
       int unstable = negative, followed;
