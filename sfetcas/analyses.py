@@ -74,4 +74,4 @@ def solve(
         from .dynamics.modes import find_modes
 
         return find_modes(scene, settings)
-    return stops.solve_stopped(scene, settings) if scene.stopped else statics.solve(scene, settings)
+    return stops.solve_stopped(scene, settings) if scene.stopped or scene.reversed else statics.solve(scene, settings)

@@ -221,7 +221,7 @@ def test_expressions_say_what_answers_say():
         square,
         loads=force,
         springs={"k": {"node": "B", "stiffness": 1e-3, "axis": [0, 0, 1]}},
-        tendons={"t": {"way": [{"member": "m", "offset": [0.01, 0.02]}], "tension": 0.02}},
+        tendons={"t": {"way": [{"member": "m", "offset": [0.01, 0.02]}], "tension": 0.02, "friction": 0.2}},
         actuations={"k": {"member": "m", "value": [0.3, -0.4, 0.5], "profile": {"polynomial": [1, 1]}}},
         fields={
             "even": {"value": [0.02, 0.03, -0.01]},

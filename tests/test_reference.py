@@ -113,6 +113,7 @@ def every_kind():
         {**clamped, "sections": stretching, "springs": pulled, "motions": moved},
         {**clamped, "contacts": floor, "loads": force},
         {**clamped, "tendons": {"t": {"way": [{"member": "m", "offset": 0.1}], "pull": 0.01}}},
+        {**clamped, "tendons": {"t": {"way": [{"member": "m", "offset": 0.1}], "tension": 0.1, "friction": 0.2}}},
         {**clamped, "fields": {"B": {"value": [0, 1]}}, "magnets": {"end": {"node": "B", "moment": [1, 0]}}},
     ):
         yield solve(Scene.from_dict(table)).last

@@ -94,7 +94,13 @@ class AnswerKind:
     @property
     def numeric(self) -> bool:
         """Whether its value consists of numbers."""
-        return self.name not in ("certificate.stable", "contacts.NAME.member", "tendons.NAME.slack")
+        return self.name not in (
+            "certificate.stable",
+            "contacts.NAME.member",
+            "tendons.NAME.slack",
+            "tendons.NAME.tensions",
+            "tendons.NAME.released",
+        )
 
     @property
     def named(self) -> bool:
@@ -150,6 +156,9 @@ springs.NAME.stop | N m, N | | statics | of one with a stop: what that adds; zer
 tendons.NAME.tension | N | | all | below zero where it pushes, as a chamber
 tendons.NAME.length | m | | all | along its way
 tendons.NAME.slack | | | statics, motion | of one that does not push, with a length or stiffness
+tendons.NAME.far_tension | N | | all | of one with friction, at the end that is not pulled
+tendons.NAME.tensions | N | | statics, motion | the same behind each piece of its way, a list from the pulled end on
+tendons.NAME.released | | | statics, motion | of one with friction: whether it is let out instead of pulled
 motions.NAME.moment | N m | x y z | statics, motion, parameters | what makes a rotation; a number where that is one
 motions.NAME.force | N | x y z | statics, motion, parameters | what makes a displacement; a number at a driven joint
 magnets.NAME.energy | J | | statics, motion, parameters | minus the moment times the field, summed along members
@@ -201,6 +210,9 @@ APPLIES: dict[str, Callable[[Any, Any], bool]] = {
     "springs.NAME.force": lambda scene, spring: spring.type == "translational",
     "springs.NAME.stop": lambda scene, spring: spring.stop is not None,
     "tendons.NAME.slack": lambda scene, tendon: tendon.measured and not tendon.pushes,
+    "tendons.NAME.far_tension": lambda scene, tendon: tendon.rubs,
+    "tendons.NAME.tensions": lambda scene, tendon: tendon.rubs,
+    "tendons.NAME.released": lambda scene, tendon: tendon.rubs,
     "motions.NAME.moment": lambda scene, motion: motion.rotation is not None,
     "motions.NAME.force": lambda scene, motion: motion.displacement is not None,
     "stiffness.NAME": lambda scene, node: node.support == "free",

@@ -109,6 +109,8 @@ def _spins(members: Mapping[str, Member]) -> Iterator[Finding]:
     for name, member in members.items():
         if isinstance(member.spin, tuple) and _turns_out(member.spin):
             yield ("members", name, "spin"), "is not about z"
+        if any(part != 0.0 for part in member.turned_about[:2]):
+            yield ("members", name, "turned"), "is not about z"
 
 
 def _cylindrical(nodes: Mapping[str, Node], members: Mapping[str, Member]) -> Iterator[Finding]:

@@ -85,12 +85,20 @@ def check_velocities(
             found = say(member.spin if isinstance(member.spin, float) else member.spin.to_dict())
             message = f"found {found}, accepted: a vector [x, y, z], as {space}"
             raise SceneError(message, ("members", name, "spin"))
+        if space is not None and member.turned is not None and not isinstance(member.turned, tuple):
+            found = say(member.turned if isinstance(member.turned, float) else member.turned.to_dict())
+            message = f"found {found}, accepted: a rotation vector [x, y, z], as {space}"
+            raise SceneError(message, ("members", name, "turned"))
+        if member.turned is not None and analysis.initial == "equilibrium":
+            message = "found with initial = 'equilibrium', which says the shape at t = 0, accepted: 'undeformed'"
+            raise SceneError(message, ("members", name, "turned"))
 
 
 def _begun(nodes: Mapping[str, Node], members: Mapping[str, Member]) -> Iterator[tuple[str, ...]]:
     """Places of the keys that set a scene in motion at t = 0."""
     yield from (("nodes", name, "velocity") for name, node in nodes.items() if node.velocity is not None)
     yield from (("members", name, "spin") for name, member in members.items() if member.spin is not None)
+    yield from (("members", name, "turned") for name, member in members.items() if member.turned is not None)
 
 
 def _spins(member: Member) -> bool:

@@ -30,6 +30,7 @@ from .records import Named, Record, Vector, brief, counted, number, say, unknown
 from .sections import CrossSection
 from .shapes import CenterLine, place
 from .showing import named, number_in_words, shown
+from .sliding import check_sliding, let_out, let_out_at
 from .springs import Spring
 from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
@@ -258,6 +259,25 @@ class Scene(Record):
         springs = any(spring.stop is not None for spring in self.springs.values())
         return springs or any(tendon.may_be_slack for tendon in self.tendons.values())
 
+    @property
+    def reversed(self) -> bool:
+        """Whether tendons with friction are let out at a load factor, so that each factor has equations of its own."""
+        return any(self.released_at_steps())
+
+    @cached_property
+    def released(self) -> frozenset[str]:
+        """Names of the tendons with friction that are let out: on a path downwards, and where a motion does so."""
+        rubbing = {name: tendon for name, tendon in self.tendons.items() if tendon.rubs}
+        return frozenset(n for n, tendon in rubbing.items() if let_out(tendon, self.analysis, self.histories))
+
+    def released_at_steps(self) -> tuple[frozenset[str], ...]:
+        """Names of the tendons with friction that are let out at each load factor of ``analysis.steps``."""
+        steps, found = self.analysis.steps, dict[str, tuple[bool, ...]]()
+        for name, tendon in self.tendons.items():
+            if tendon.rubs and self.analysis.type == "static":
+                found[name] = let_out_at(tendon, steps, self.histories)
+        return tuple(frozenset(name for name, out in found.items() if out[i]) for i in range(len(steps)))
+
     @cached_property
     def size(self) -> float:
         """Diagonal of the bounding box of the undeformed members, m."""
@@ -432,6 +452,8 @@ def _check_tendons(scene: Scene) -> None:
             check_pieces(scene.tendon_pieces[name], len(tendon.way), scene.center_lines)
         except SceneError as error:
             raise error.within("tendons", name) from None
+        if tendon.rubs:
+            check_sliding(name, tendon, scene.analysis, scene.histories)
         if scene.contacts:
             raise SceneError("found with contacts, accepted: without tendons", ("contacts",))
         for way in tendon.way:
@@ -729,6 +751,9 @@ def _check_moving(scene: Scene) -> None:
     for name, member in scene.members.items():
         if isinstance(member.spin, Formula):
             member.spin.check_finite(scene.center_lines[name].length, "members", name, "spin")
+        for part in member.turned_about:
+            if isinstance(part, Formula):
+                part.check_finite(scene.center_lines[name].length, "members", name, "turned")
     check_beginning(analysis, scene.nodes, scene.loads)
     if analysis.moves:
         check_no_contact(analysis, scene.contacts, scene.springs)

@@ -44,6 +44,15 @@ def _spin(value: Any) -> Any:
     return turn(value)
 
 
+def _turned(value: Any) -> Any:
+    if isinstance(value, (list, tuple)) or hasattr(value, "shape"):
+        entries = listed(value, "a number, or a vector of three")
+        if len(entries) not in (2, 3):
+            raise ValueError(f"found {len(entries)} entries, accepted: three, a rotation vector")
+        return (*(quantity(entry) for entry in entries), *[0.0] * (3 - len(entries)))
+    return quantity(value)
+
+
 def _inertia(value: Any) -> tuple[float, ...]:
     accepted = "three numbers of zero or above, about x, y and z"
     entries = tuple(number(entry) for entry in listed(value, accepted))
@@ -71,6 +80,9 @@ SLIDING = ("slider", "cylindrical", "slot")
 """Releases whose end slides along its node."""
 Count = Annotated[int, BeforeValidator(_count)]
 Spin = Annotated[Quantity | tuple[float, float, float], BeforeValidator(_spin)]
+
+
+Turned = Annotated[Quantity | tuple[Quantity, Quantity, Quantity], BeforeValidator(_turned)]
 
 
 class Node(Record):
@@ -214,6 +226,10 @@ class Member(Record):
         Dynamics: angular velocity of the sections along the member at t = 0.  In a plane scene a number or
         varying along the member, in space (3,) in the fixed axes.  Default: what follows from the others, else
         zero.
+    turned : rad
+        Dynamic: rotation of the sections along the member at t = 0 since the undeformed scene.  In a plane scene a
+        number or varying along the member, in space a rotation vector (3,) in the fixed axes, each number of which may
+        vary.  Default: zero, of a rigid member that of its nodes.
     """
 
     nodes: Annotated[tuple[str, ...], BeforeValidator(_ends)]
@@ -227,6 +243,13 @@ class Member(Record):
     stiffness: Stiffness | None = None
     mass: Mass | None = None
     spin: Spin | None = None
+    turned: Turned | None = None
+
+    @property
+    def turned_about(self) -> tuple[Quantity, Quantity, Quantity]:
+        """The rotation vector at the begin of a motion, rad."""
+        given = 0.0 if self.turned is None else self.turned
+        return given if isinstance(given, tuple) else (0.0, 0.0, given)
 
     def overhangs(self, sections: Mapping[str, CrossSection]) -> bool:
         """Whether it is flexible and the centre of mass of its section is off its line."""
@@ -268,6 +291,8 @@ class Member(Record):
         if len(self.nodes) > 2 and self.type != "small":
             message = f"found {len(self.nodes)} nodes, accepted: two; only a small member may have more"
             raise SceneError(message, ("nodes",))
+        if self.turned is not None and self.type == "small":
+            raise SceneError("found with a small member, accepted: with a flexible or rigid one", ("turned",))
         if len(self.release) != len(self.nodes):
             found = counted(len(self.release), "entry", "entries")
             message = f"found {found}, accepted: one for each of {len(self.nodes)} nodes"

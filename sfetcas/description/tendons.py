@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Any, final
+from typing import Annotated, Any, Literal, final
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
@@ -28,6 +28,7 @@ __all__ = [
     "Stretch",
     "Tendon",
     "Way",
+    "breaks_along",
     "check_pieces",
     "check_way",
     "kinks_along",
@@ -162,7 +163,7 @@ def _parts(value: Any) -> tuple[Any, ...]:
 
 
 class Tendon(Record):
-    """A tendon without friction that pulls along its way, or a chamber that pushes along it.
+    """A tendon that pulls along its way, or a chamber that pushes along it.
 
     Parameters
     ----------
@@ -185,6 +186,11 @@ class Tendon(Record):
         Whether a tendon of given length also pushes, as a rod does; else it is slack instead.
     history : name
         Name of a history that replaces the load factor of the step, by which tension, pressure or shortening grow.
+    friction : 1
+        Coefficient of friction of a tendon of given tension in its guides, zero or above: along its way the tension
+        changes by the exponential of this times the angle by which the way has turned.
+    pulled_at : text
+        With friction: ``start`` or ``end`` of its way, at which the tension is given.
     """
 
     way: Annotated[tuple[Way, ...], BeforeValidator(_parts)]
@@ -196,6 +202,8 @@ class Tendon(Record):
     stiffness: Positive | None = None
     pushes: bool = False
     history: str | None = None
+    friction: NotNegative = 0.0
+    pulled_at: Literal["start", "end"] = "start"
 
     @model_validator(mode="after")
     def _check(self) -> Tendon:
@@ -213,7 +221,15 @@ class Tendon(Record):
             for key in ("stiffness", "pushes"):
                 if getattr(self, key):
                     raise SceneError(f"found with a {given[0]}, accepted: with a pull or a length", (key,))
+        if self.rubs and self.tension is None:
+            found = f"found with a {given[0]}" if given else "found without a tension"
+            raise SceneError(f"{found}, accepted: with a tension, which is that at the pulled end", ("friction",))
         return self
+
+    @property
+    def rubs(self) -> bool:
+        """Whether there is friction in its guides."""
+        return bool(values_of(self.friction) > 0.0)
 
     @property
     def measured(self) -> bool:
@@ -265,6 +281,11 @@ class Stretch:
     member: str
     start: float
     end: float
+
+    @property
+    def forwards(self) -> bool:
+        """Whether the tendon goes in the direction of the member."""
+        return self.way.ends[0] < self.way.ends[1]
 
 
 Piece = tuple[Hole, Hole] | Stretch
@@ -362,6 +383,12 @@ NEAR = 1e-9
 """Holes of one body nearer than this share of their distance from the centre line are one."""
 
 
+def breaks_along(way: Way) -> Iterator[float]:
+    """Fractions of the length of a member at which the offset of a way along it has a kink."""
+    for part in way.offset or ():
+        yield from breaks(part)
+
+
 def kinks_along(tendon: Tendon, member: str) -> Iterator[float]:
     """Fractions of the length of a member at which elements have to end for a tendon."""
     for way in tendon.way:
@@ -369,8 +396,7 @@ def kinks_along(tendon: Tendon, member: str) -> Iterator[float]:
             continue
         yield from way.ends if way.discs is None else way.holes
         if way.discs is None:
-            for part in way.offset or ():
-                yield from breaks(part)
+            yield from breaks_along(way)
 
 
 def check_way(tendon: Tendon, nodes: Mapping[str, Node], members: Mapping[str, Member]) -> None:

@@ -18,6 +18,7 @@ from ..mathematics.arrays import Array, first_of_largest
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import rotations_along, strained_like
 from ..mechanics.model import Model
+from ..mechanics.tendon_friction import settle
 from .stages import StageEquations
 
 __all__ = ["at_rest", "equilibrium_before", "moving", "posed", "velocities"]
@@ -48,7 +49,7 @@ def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
             driven.setdefault(table, {})[name] = record.model_copy(update=now(record))
     analysis = Analysis(accuracy=scene.analysis.accuracy, unstable=scene.analysis.unstable)
     nodes = {name: node.model_copy(update={"velocity": None}) for name, node in scene.nodes.items()}
-    members = {name: member.model_copy(update={"spin": None}) for name, member in scene.members.items()}
+    members = {name: member.model_copy(update={"spin": None, "turned": None}) for name, member in scene.members.items()}
     # Of tendons what their histories begin with.
     still = {name: history.factor(0.0) for name, history in histories.items()} if scene.tendons else {}
     driven["histories"] = {name: History(t=(0.0, 1.0), value=(factor, factor)) for name, factor in still.items()}
@@ -56,7 +57,8 @@ def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
     # What acts later only, or is cut, may be all that makes a scene one in space.
     tables |= {"dimension": scene.resolved_dimension, "analysis": analysis, "expect": ()}
     before = Scene(**{**_given_keys(scene), **tables})
-    return (stops.solve_stopped(before, settings) if scene.stopped else statics.solve(before, settings)).last
+    out = tuple((name, "released") for name in scene.released)
+    return (stops.solve_stopped(before, settings) if scene.stopped else statics.solve(before, settings, stops=out)).last
 
 
 DRIVEN = ("value", "displacement", "rotation", "gradient", "moment")
@@ -106,6 +108,7 @@ def at_rest(model: Model) -> State:
     q = np.zeros((len(model.rotations.kind), model.element.components))
     q[:, 0] = 1.0 if model.space else 0.0
     y, lam = np.zeros(len(model.positions.unknowns)), np.zeros(len(model.row_names))
+    settle(model, q, y)
     return State(q, y, lam, np.zeros(model.unwrapping.count))
 
 
@@ -135,6 +138,7 @@ def posed(model: Model, source: Equilibrium) -> State:
         minlength=len(model.positions.unknowns),
     )
     strained_like(model, y, origin, source.state.y)
+    settle(model, q, y)
     unwrapped = model.unwrapping.angles(q, _unwrapped(model, source))
     return State(q, y, state.lam, unwrapped)
 

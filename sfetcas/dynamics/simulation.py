@@ -36,6 +36,7 @@ from .integrators import SHORTEST, InitialState, Integrator, Stages, TimeGrid
 from .methods import GeneralisedAlpha, Radau
 from .motion import MotionState, Mover, Trajectory
 from .sampling import StepRecord
+from .shaping import shaped
 from .stages import StageEquations
 from .watching import Watch, finer
 
@@ -230,6 +231,8 @@ class Simulation:
         equations, factors = system.equations, system.factors(0.0)
         loading = system.loading(factors)
         state = equations.holding(state, loading)
+        if any(member.turned is not None for member in self.scene.members.values()):
+            state, notes = shaped(equations, state, loading)
         if self.weightless:
             if self.name == "conserving":
                 message = (

@@ -23,13 +23,13 @@ from .statics import Settings, solve
 __all__ = ["solve_stopped"]
 
 Stops = tuple[tuple[str, str], ...]
-"""Springs that stand at a stop: name, and low or high; tendons that are slack: name, and slack."""
+"""Springs at a stop: name, and low or high; tendons that are slack or let out: name, and slack or released."""
 
 T = TypeVar("T")
 
 
 def solve_stopped(scene: Scene, settings: Settings) -> Solution:
-    """Equilibria of a scene whose springs have stops, or whose tendons may be slack.
+    """Equilibria of a scene whose springs have stops, or whose tendons may be slack or are let out against friction.
 
     Raises
     ------
@@ -44,9 +44,10 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
     steps: list[Equilibrium] = []
     status, seconds = Status.SOLVED, {"model": 0.0, "solve": 0.0}
     stops: Stops = ()
-    for factor in scene.analysis.steps:
+    for factor, released in zip(scene.analysis.steps, scene.released_at_steps(), strict=True):
         try:
-            found, stops = _at_stops(scene, settings, factor, stops)
+            out = tuple((name, "released") for name in scene.tendons if name in released)
+            found, stops = _at_stops(scene, settings, factor, stops, out)
         except SolveError as error:
             raise at_factor(error, scene, factor, steps, seconds) from None
         steps += found.steps
@@ -55,13 +56,13 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
     return Solution(scene, status, tuple(steps), seconds)
 
 
-def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops) -> tuple[Solution, Stops]:
-    """The answer of one factor, from the stops that the factor before it reached."""
+def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops, released: Stops) -> tuple[Solution, Stops]:
+    """The answer of one factor with the tendons that are let out, from the stops that the factor before it reached."""
     alone = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"steps": (factor,)})})
     tried: set[Stops] = set()
     while stops not in tried:
         tried.add(stops)
-        found = solve(alone, settings, stops=stops)
+        found = solve(alone, settings, stops=(*stops, *released))
         change = _next_stops(found.last, stops)
         if change == stops:
             return found, stops

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from .connections import connections_of
 from .equations import Equations, State
 from .loading import Loading
 from .segments import elongation_of
+from .tendon_friction import part_of
 from .terms import answers_of
 
 __all__ = ["Balance", "SpringState", "three"]
@@ -129,15 +131,27 @@ class Balance:
             found[element] -= self._shares[number][i, side * self._turns : (side + 1) * self._turns]
         return self._three(found[elements])
 
-    def tendon(self, name: str) -> dict[str, float]:
-        """Tension, N, and length, m, of a tendon."""
-        found, scales = {"tension": 0.0, "length": 0.0}, self.model.scales
+    def tendon(self, name: str) -> dict[str, Any]:
+        """Tension, N, and length, m, of a tendon; of one that rubs tensions (pieces,) behind its pieces, too, N."""
+        found: dict[str, Any] = {"tension": 0.0, "length": 0.0}
+        scales, behind = self.model.scales, list[tuple[float, float, float]]()
         for number, group in enumerate(self.model.connections):
             if group.kind.table == "tendons" and name in group.names:
                 own = self._answers(number)[[each == name for each in group.names]]
                 found["tension"] = float(own[0, 0]) * scales.force
                 found["length"] += float(own[:, 1].sum()) * scales.length
-        return found
+                if "piece" in group.kind.answers:
+                    behind += [(number, piece, tension) for tension, piece, number in own[:, 2:5].tolist()]
+        # The last part of each piece.
+        tensions = {piece: tension * scales.force for _, piece, tension in sorted(behind)}
+        return found | {"tensions": list(tensions.values())} if tensions else found
+
+    def tensions(self, name: str, piece: int, element: int = -1) -> Array:
+        """Tensions (points,) of a tendon that rubs at the points of an element along which a piece of its way goes, or
+        where a piece begins that goes along a rigid member, dimensionless.
+        """
+        number, i = part_of(self.model, name, piece, element)
+        return np.asarray(self._answers(number - 1)[i, 5:])
 
     def rest_length(self, name: str) -> float:
         """Length of a tendon in the undeformed scene, m."""

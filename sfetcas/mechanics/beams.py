@@ -30,7 +30,7 @@ class Scales:
 
     def of(self, unit: str) -> float:
         """The SI value of the dimensionless number 1 of a quantity in ``m``, ``N``, ``N m``, ``J`` or ``rad``."""
-        return {"m": self.length, "N": self.force, "N m": self.moment, "J": self.moment, "rad": 1.0}[unit]
+        return {"m": self.length, "N": self.force, "N m": self.moment, "J": self.moment, "rad": 1.0, "1": 1.0}[unit]
 
 
 @dataclass(frozen=True, eq=False)

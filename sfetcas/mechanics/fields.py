@@ -14,8 +14,9 @@ import numpy as np
 
 from .. import tolerances
 from ..description.answers import single_number
+from ..description.tendons import Stretch
 from ..mathematics import curves, quaternion
-from ..mathematics.arrays import Array, first_of_largest
+from ..mathematics.arrays import Array, first_of_largest, values_of
 from ..mathematics.interpolation import differentiation, evaluation
 from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
@@ -28,6 +29,7 @@ from .magnetism import magnet_terms
 from .mesh import Touch
 from .singles import fibre_strain
 from .stations import Stations
+from .tendon_friction import settle, turned_since
 from .tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
 from .terms import answers_of, energies_of
 
@@ -291,9 +293,10 @@ class Fields:
     def _strung(self, member: str, x: Array, rotation: Array, moment: Array) -> tuple[Array, Array]:
         """Moment and force (n, 3) that tendons along a member carry at its sections, dimensionless."""
         model, at, turns = self.model, self._stations(member, x), self.model.element.turns
-        part, force = model.elements_of(member), model.scales.force
-        names = [name for name, _ in stretches_of(model.scene, member)]
-        tensions = [self.balance.tendon(name)["tension"] / force for name in names]
+        part = model.elements_of(member)
+        tensions = np.column_stack(
+            [self._tensions(name, piece, x) for name, piece in stretches_of(model.scene, member)]
+        )
         nodal = self.q[model.rotations.turns[part]][at.elements]
         lengths = model.beams.weight[part].sum(axis=1)[at.elements]
         slope = np.einsum("nj,njc->nc", at.slopes, nodal) / lengths[:, None]
@@ -303,14 +306,14 @@ class Fields:
             body = quaternion.rotate(quaternion.conjugate(rotation), moment)
         # What is rigid is not bent.
         steps = NEWTON_STEPS if model.scene.members[member].type == "flexible" else 0
-        function = share_of(model.space, len(names), steps).map(len(x))
+        function = share_of(model.space, tensions.shape[1], steps).map(len(x))
         data, frames = section_data(model, member, x, model.scales), model.scene.center_lines[member].quaternions(x)
         natural = quaternion.rotate(frames, self.natural(member, x))[:, -turns:] * model.scales.length
         strain = np.zeros((len(x), model.element.axes))
         if model.element.strains:
             gained = gained_tangents(model, self.state)[part] / model.beams.weight[part][..., None]
             strain = np.einsum("np,npa->na", at.at_points, gained[at.elements])
-        given = (body[:, -turns:], guess, natural, strain, data, np.tile(tensions, (len(x), 1)))
+        given = (body[:, -turns:], guess, natural, strain, data, tensions)
         found = function(*(part.T for part in given))
         about, along = (part.full().T for part in found)
         if model.space:
@@ -318,10 +321,38 @@ class Fields:
         about = np.pad(about, ((0, 0), (2, 0)))
         return about, _three(quaternion.turned_by(rotation[:, None, :], along[:, None, :])[:, 0])
 
-    def tendon(self, name: str) -> dict[str, float | bool]:
-        """Tension, N, and length, m, of a tendon, and of one that does not push whether it is slack."""
-        found: dict[str, float | bool] = {**self.balance.tendon(name)}
+    def _tensions(self, name: str, piece: Stretch, x: Array) -> Array:
+        """Tension (n,) of a tendon along a member at fractions x (n,) of it, dimensionless."""
+        model, member, tendon = self.model, piece.member, self.model.scene.tendons[name]
+        if not tendon.rubs:
+            return np.full(len(x), self.balance.tendon(name)["tension"] / model.scales.force)
+        number = model.scene.tendon_pieces[name].index(piece)
+        if model.scene.members[member].type == "rigid":
+            rate = float(values_of(tendon.friction)) * (-1.0 if self.released(name) else 1.0)
+            turned = turned_since(model.scene.center_lines[member], tendon, piece, x)
+            return np.asarray(self.balance.tensions(name, number)[0] * np.exp(-rate * turned))
+        at, part, cuts = self._stations(member, x), model.elements_of(member), model.mesh.cuts[member]
+        middle = 0.5 * (cuts[at.elements] + cuts[at.elements + 1])
+        found = np.zeros((len(x), model.element.order + 1))
+        for element in np.unique(at.elements[(middle > piece.start) & (middle < piece.end)]).tolist():
+            found[at.elements == element] = self.balance.tensions(name, number, part.start + element)
+        return np.asarray(np.einsum("np,np->n", at.at_points, found))
+
+    def released(self, name: str) -> bool:
+        """Whether a tendon that rubs is let out, so that its tension rises from the pulled end on."""
+        return (name, "released") in self.model.mesh.stops or name in self.model.scene.released
+
+    def tendon(self, name: str) -> dict[str, Any]:
+        """Tension, N, and length, m, of a tendon, and of one that does not push whether it is slack.
+
+        Of one that rubs also the tension at the end that is not pulled and tensions (pieces,) behind the pieces of its
+        way, N, from the pulled end on, and whether it is let out.
+        """
+        found: dict[str, Any] = {**self.balance.tendon(name)}
         tendon = self.model.scene.tendons[name]
+        if tendon.rubs:
+            tensions = found.pop("tensions")
+            return {**found, "far_tension": tensions[-1], "tensions": tensions, "released": self.released(name)}
         if not tendon.measured or tendon.pushes:
             return found
         slack = (name, "slack") in self.model.mesh.stops
@@ -822,6 +853,7 @@ def transferred(source: Any, state: State, target: Any) -> State:
             q[number] = state.q[source.rotations.node_turn[name]]
     y = _by_name(source.positions.unknowns, state.y, target.positions.unknowns)
     strained_like(target, y, source, state.y)
+    settle(target, q, y)
     lam = _by_name(source.row_names, state.lam, target.row_names)
     return State(q, y, lam, state.unwrapped)
 

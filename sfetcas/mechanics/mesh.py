@@ -163,6 +163,8 @@ def breaks_of(scene: Scene, member: str) -> Array:
     for table in (scene.actuations, scene.magnets):
         for acting in table.values():
             places += acting.breaks if acting.member == member else ()
+    for part in scene.members[member].turned_about:
+        places += kinks(part, scene.center_lines[member].length)
     for tendon in scene.tendons.values():
         places += kinks_along(tendon, member)
     places = sorted(places)

@@ -36,6 +36,7 @@ from .pressure import is_pressure
 from .rotating_frame import RotatingFrame, with_rotating_frame
 from .rotations import RotationFreedom, Rotations, number_rotations
 from .segments import Segments, cut_members
+from .tendon_friction import rubbing_in
 from .tendon_terms import tendons_in
 from .terms import Group, One, grouped
 from .unwrapping import Unwrapping, unwrapping_of
@@ -52,6 +53,7 @@ SOURCES: list[Callable[[Parts], Iterable[One]]] = [
     magnets_in,
     center_weights_in,
     tendons_in,
+    rubbing_in,
 ]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
 
@@ -176,6 +178,8 @@ class Model:
         """Whether a group of connections has loads without potential; a moment on what is held does no work."""
         if group.kind.has_potential:
             return False
+        if not group.kind.is_load:
+            return True
         fixed = (self.rotations.kind[group.turns] == RotationFreedom.FIXED).all(axis=1) & (group.places.shape[1] == 0)
         return any(loading.loads[number][~fixed].any() for loading in self.groups.values())
 

@@ -26,6 +26,9 @@ def is_pressure(scene: Scene) -> bool:
     # Followers are forces per length of the undeformed member, which is not that of the curve where it stretches.
     if scene.resolved_dimension == "space" or scene.stretches or scene.shifted:
         return False
+    # Friction has none.
+    if any(tendon.rubs for tendon in scene.tendons.values()):
+        return False
     # By history, of what ends at a node, or within a member at a fraction of its length.
     left: dict[tuple[str | None, str | tuple[str, float]], float] = {}
     size = 0.0

@@ -21,7 +21,7 @@ from ..mathematics.arrays import Array, Index
 from .mesh import Mesh
 from .rotations import end_joints
 
-__all__ = ["MOST_COUPLED", "Segment", "Segments", "cushioned", "cut_members", "elongation_of", "spanned"]
+__all__ = ["MOST_COUPLED", "Segment", "Segments", "cushioned", "cut_members", "elongation_of", "spanned", "tensions_of"]
 
 MOST_COUPLED = 20
 """Rotations and strains at most that the length between two holes of a tendon couples: of more, places of the holes are
@@ -118,12 +118,33 @@ def elongation_of(tendon: str) -> str:
     return f"elongation of tendons.{tendon}"
 
 
+def tensions_of(scene: Scene, mesh: Mesh, tendon: str) -> tuple[str, ...]:
+    """Names of the places whose displacements are the tension behind each part of a tendon that rubs, but the last.
+
+    In the order from the pulled end: a part is a straight piece, a piece along a rigid member, or an element.
+    """
+    if not scene.tendons[tendon].rubs:
+        return ()
+    names: list[str] = []
+    for i, piece in enumerate(scene.tendon_pieces[tendon]):
+        if isinstance(piece, tuple) or scene.members[piece.member].type == "rigid":
+            names.append(f"tension of tendons.{tendon} behind its piece {i + 1}")
+            continue
+        cuts = mesh.cuts[piece.member]
+        inside = cuts[mesh.cut_at(piece.member, piece.start) : mesh.cut_at(piece.member, piece.end) + 1]
+        ends = zip(inside, inside[1:], strict=False)
+        found = [f"tension of tendons.{tendon} in its piece {i + 1}, {a:.12g} to {b:.12g}" for a, b in ends]
+        names += found if piece.forwards else found[::-1]
+    return tuple((names if scene.tendons[tendon].pulled_at == "start" else names[::-1])[:-1])
+
+
 def spanned(scene: Scene, mesh: Mesh, piece: Piece) -> range:
     """Numbers, along their member, of the elements between two holes of a tendon that need no places; else none.
 
-    The holes are in one flexible member, with few elements between them, which integrate at their nodes.
+    The holes are in one flexible member, with few elements between them, which integrate at their nodes and are
+    strained by their own strains alone.
     """
-    if mesh.places or mesh.gauss or not isinstance(piece, tuple):
+    if mesh.places or mesh.gauss or scene.shifted or not isinstance(piece, tuple):
         return range(0)
     first, last = piece
     member = first.member
@@ -138,9 +159,9 @@ def spanned(scene: Scene, mesh: Mesh, piece: Piece) -> range:
 
 def _placed(scene: Scene, mesh: Mesh) -> Iterator[Hole]:
     """The holes of tendons that need places: the ends of straight pieces that are no function of rotations alone."""
-    for pieces in scene.tendon_pieces.values():
+    for name, pieces in scene.tendon_pieces.items():
         for piece in pieces:
-            if isinstance(piece, tuple) and not spanned(scene, mesh, piece):
+            if isinstance(piece, tuple) and (scene.tendons[name].rubs or not spanned(scene, mesh, piece)):
                 yield from piece
 
 
@@ -226,6 +247,8 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
         if tendon.stiffness is not None:
             places.append(elongation_of(name))
             retained.add(elongation_of(name))
+        places += tensions_of(scene, mesh, name)
+        retained |= set(tensions_of(scene, mesh, name))
     # Turning axes act upon all that has mass.
     retained |= set(scene.nodes) if scene.rotating is not None else set()
     retained |= set(_sprung(scene, mesh)) | {load.node for load in scene.loads.values() if load.follows and load.node}

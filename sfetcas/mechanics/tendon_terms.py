@@ -25,7 +25,7 @@ from typing import Any, ClassVar, Literal, final
 import casadi as ca
 import numpy as np
 
-from ..description.tendons import Hole, Stretch, Tendon, tangent
+from ..description.tendons import Hole, Piece, Stretch, Tendon, tangent
 from ..mathematics.arrays import Array, numbers
 from ..mathematics.quaternion import product
 from .elements import Element
@@ -33,7 +33,7 @@ from .parts import Parts
 from .segments import elongation_of, spanned
 from .terms import ARGUMENTS, GROUND, One, Side, Term, name_of
 
-__all__ = ["Elongation", "Routed", "Spanned", "Strung", "tendons_in"]
+__all__ = ["Elongation", "Routed", "Spanned", "Strung", "length_of_piece", "loose_in", "tendons_in"]
 
 _Chart = Literal["vectors", "components"]
 """Derivatives by rotations: by vectors about the fixed axes, or by components of quaternions."""
@@ -58,9 +58,13 @@ class _Part(Term):
 
     given: bool
 
+    def along(self, q: list[Side], u: list[Side], data: ca.SX) -> list[ca.SX]:
+        """The vectors along it whose lengths add up to its length, of an element before they turn."""
+        raise NotImplementedError
+
     def length(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
         """Length at a state."""
-        raise NotImplementedError
+        return sum((ca.norm_2(part) for part in self.along(q, u, data)), ca.SX(0))
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """The tension times the change of the length."""
@@ -98,13 +102,13 @@ class Routed(_Part):
         n, strains, *_ = self.element.sizes
         return n, strains, int(self.given), n * (2 * self.axes + self.element.compliances) + 2, 1
 
-    def length(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
-        """Sum over the points."""
+    def along(self, q: list[Side], u: list[Side], data: ca.SX) -> list[ca.SX]:
+        """At each point the derivative of its places times weight and length, before the rotation of the point."""
         n, axes = self.element.order + 1, self.axes
         forward, arm = (ca.reshape(data[i * n * axes : (i + 1) * n * axes], axes, n) for i in range(2))
         compliance = ca.reshape(data[2 * n * axes : data.shape[0] - 2], self.element.compliances, n)
         here, slope = self.element.at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
-        total = ca.SX(0)
+        found = []
         for k in range(n):
             if self.space:
                 turned = ca.cross(self.element.curvature(here[:, k], slope[:, k]), arm[:, k])
@@ -112,8 +116,8 @@ class Routed(_Part):
                 turned = slope[0, k] * ca.vertcat(-arm[1, k], arm[0, k])
             by = self.element.yields(here[:, k], slope[:, k], ca.vertcat(*u[k]) if u else ca.SX(0, 1))
             way = self.element.strained(forward[:, k], compliance[:, k], by)
-            total += ca.norm_2(way + turned)
-        return total
+            found.append(way + turned)
+        return found
 
     # In space as of elements: derivatives of one point, mapped over the points and put together by constant matrices.
 
@@ -187,14 +191,14 @@ class Strung(_Part):
         """Two rotations and two places."""
         return 2, 2, int(self.given), 3 * self.axes + 2, 1
 
-    def length(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
-        """Distance of the holes."""
+    def along(self, q: list[Side], u: list[Side], data: ca.SX) -> list[ca.SX]:
+        """The vector from hole to hole, in the fixed axes."""
         n = self.axes
         gap = data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])
         moved = [
             self.turned_back(self.reverse(side), ca.vertsplit(data[n * i : n * i + n])) for i, side in enumerate(q, 1)
         ]
-        return ca.norm_2(gap + ca.vertcat(*moved[1]) - ca.vertcat(*moved[0]))
+        return [gap + ca.vertcat(*moved[1]) - ca.vertcat(*moved[0])]
 
     def reverse(self, q: Side) -> Side:
         """The opposite rotation."""
@@ -461,9 +465,25 @@ class Elongation(Term):
 
 
 def tendons_in(parts: Parts) -> Iterator[One]:
-    """Terms of the tendons and chambers of a scene."""
+    """Terms of the tendons and chambers of a scene, but for those that rub."""
     for name, tendon in parts.scene.tendons.items():
-        yield from _Maker(parts, name, tendon).all()
+        if not tendon.rubs:
+            yield from _Maker(parts, name, tendon).all()
+
+
+def loose_in(parts: Parts, name: str) -> Iterator[tuple[Piece, list[One]]]:
+    """The pieces of a tendon, in the order of its way, and the terms of each without what links them.
+
+    A piece along a rigid member has none.  Straight pieces go from the pulled end on, elements are in the order of
+    their member.
+    """
+    tendon, scene = parts.scene.tendons[name], parts.scene
+    maker = _Maker(parts, name, tendon)
+    for piece in scene.tendon_pieces[name]:
+        if isinstance(piece, tuple):
+            yield piece, [maker._strung(*(piece[::-1] if tendon.pulled_at == "end" else piece))]
+        else:
+            yield piece, [] if scene.members[piece.member].type == "rigid" else list(maker._routed(piece))
 
 
 @dataclass(frozen=True, eq=False)
@@ -489,7 +509,7 @@ class _Maker:
                 between = spanned(scene, self.parts.mesh, piece)
                 found.append(self._spanned(piece, between) if between else self._strung(*piece))
             elif scene.members[piece.member].type == "rigid":
-                still = still + _length(piece, scene.center_lines[piece.member]) / scales.length
+                still = still + length_of_piece(piece, scene.center_lines[piece.member]) / scales.length
             else:
                 found += self._routed(piece)
         rest = sum((one.data[-2] for one in found), still)
@@ -603,7 +623,7 @@ class _Maker:
             yield One(kind, self.name, "", numbers(data), turns, places, self._row, element=number)
 
 
-def _length(piece: Stretch, line: Any) -> Any:
+def length_of_piece(piece: Stretch, line: Any) -> Any:
     """Length of a stretch along a rigid member, m."""
     cuts = np.linspace(piece.start, piece.end, PARTS + 1)
     nodes, weights = np.polynomial.legendre.leggauss(8)

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..description.answers import PARAMETERS, STEPS, AnswerName, answer_name, check_answer, single_number
 from ..description.records import unknown
+from ..description.tendons import Stretch
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers, values_of
@@ -28,6 +29,7 @@ from ..mechanics.reactions import Reactions
 from ..mechanics.singles import fibre_strain, spin_of, turned_vector
 from ..mechanics.stationarity import Stationarity
 from ..mechanics.stations import Stations
+from ..mechanics.tendon_friction import part_of
 from ..mechanics.tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
 from ..mechanics.terms import answers_of
 from ..solvers.program import Program
@@ -88,7 +90,8 @@ def default_results(model: Model, *, unique: bool = True) -> list[str]:
     for name, spring in model.scene.springs.items():
         pair = ("angle", "moment") if spring.type == "rotational" else ("travel", "force")
         names += [f"springs.{name}.{field}" for field in pair]
-    names += [f"tendons.{name}.{field}" for name in model.scene.tendons for field in ("tension", "length")]
+    for name, tendon in model.scene.tendons.items():
+        names += [f"tendons.{name}.{field}" for field in ("tension", "length", *["far_tension"] * tendon.rubs)]
     return [*names, "energy.elastic", "energy.potential"]
 
 
@@ -560,8 +563,8 @@ class _Outputs:
         """Section moment, and force of tendons along a member, at the places, (3, places) each."""
         model, at, moment = self._model, self._stations(member), self._cut(member)
         part, turns = model.elements_of(member), self._expressions.turns
-        names = [name for name, _ in stretches_of(model.scene, member)]
-        tensions = ca.vertcat(*(self._tendon(name, "tension") for name in names)) / model.scales.force
+        pieces = stretches_of(model.scene, member)
+        tensions = ca.vertcat(*(self._tensions(name, piece) for name, piece in pieces)) / model.scales.force
         nodes = model.rotations.turns[part][at.elements]
         lengths = np.asarray(self._results.lengths(member))[at.elements]
         pairs = zip(nodes, at.slopes / lengths[:, None], strict=True)
@@ -572,12 +575,29 @@ class _Outputs:
             opposite = ca.vertcat(q[0, :], -q[1:, :])
             back = self._expressions.many(turned_vector(True), n)(opposite, moment)
             guess = self._expressions.many(spin_of(), n)(q, slope)
-        function = self._expressions.many(share_of(model.space, len(names), NEWTON_STEPS), n)
+        function = self._expressions.many(share_of(model.space, len(pieces), NEWTON_STEPS), n)
         natural, strain = self._natural_about(member)[3 - turns :, :], self._strain(member)
-        about, along = function(back, guess, natural, strain, self._tendons[member], ca.repmat(tensions, 1, n))
+        about, along = function(back, guess, natural, strain, self._tendons[member], tensions)
         turned = self._expressions.many(turned_vector(model.space), n)
         force = self._three(turned(q, along))
         return moment - (turned(q, about) if model.space else self._about(about)), force
+
+    def _tensions(self, name: str, piece: Stretch) -> ca.MX:
+        """Tension of a tendon along a member at its places, (1, places), N."""
+        model, at = self._model, self._stations(piece.member)
+        if not model.scene.tendons[name].rubs:
+            return ca.repmat(self._tendon(name, "tension"), 1, len(at.elements))
+        number = model.scene.tendon_pieces[name].index(piece)
+        rigid = model.scene.members[piece.member].type == "rigid"
+        first, found = model.elements_of(piece.member).start, list[ca.MX]()
+        for element, weights in zip(at.elements.tolist(), at.at_points, strict=True):
+            group, i = part_of(model, name, number, -1 if rigid else first + element)
+            keys = [key for key in model.terms[group].kind.answers if key.startswith("tension at")] if i >= 0 else []
+            values = [self._told(group, i, key) for key in keys]
+            # Along what is rigid it is that where it begins.
+            share = [1.0] if rigid else weights.tolist()
+            found.append(sum((w * value for w, value in zip(share, values, strict=False)), ca.MX(0.0)))
+        return ca.horzcat(*found)
 
     def _strain(self, member: str) -> ca.MX:
         """What stretch and shear add to the unit tangent before it is turned, (axes, places)."""
@@ -651,7 +671,8 @@ class _Outputs:
         """Tension, or length as the sum over its parts."""
         found = []
         for number, group in enumerate(self._model.terms):
-            own = [i for i, each in enumerate(group.names) if each == name and group.kind.table == "tendons"]
+            told = group.kind.table == "tendons" and key in group.kind.answers
+            own = [i for i, each in enumerate(group.names) if each == name and told]
             found += [self._told(number, i, key) for i in own[: None if key == "length" else 1]]
         return sum(found[1:], found[0]) if key == "length" else found[0]
 

@@ -108,6 +108,9 @@ class ControlledSystem:
                 raise SceneError(f"found {name!r}, accepted: {accepted} histories.NAME of one", ("controls",))
         for name, tendon in scene.tendons.items():
             controlled = any(one.startswith(f"tendons.{name}.") for one in names) or tendon.history is not None
+            if controlled and tendon.rubs:
+                message = "found a control of a tension that may rise and fall, with which friction would jump,"
+                raise SceneError(f"{message} accepted: a tendon without friction", ("controls", f"tendons.{name}"))
             if controlled and tendon.measured and tendon.stiffness is None:
                 message = "found a control of a length that has to be followed at once, accepted: of a tension, or of a"
                 raise SceneError(f"{message} tendon with a stiffness", ("controls", f"tendons.{name}"))

@@ -36,7 +36,7 @@ def rigid(scene: Scene) -> Scene | None:
     for name in flexible:
         member = table["members"][name]
         member["type"] = "rigid"
-        for key in ("element", "elements", "spin"):
+        for key in ("element", "elements", "spin", "turned"):
             member.pop(key, None)
     table.pop("expect", None)
     return Scene.from_dict(table)
