@@ -50,7 +50,9 @@ if TYPE_CHECKING:
     from .description.laws import Potential as Potential
     from .description.laws import RambergOsgood as RambergOsgood
     from .description.laws import Ribbon as Ribbon
+    from .description.laws import Sadowsky as Sadowsky
     from .description.laws import StressStrain as StressStrain
+    from .description.relaxation import Relaxation as Relaxation
     from .description.scene import Analysis as Analysis
     from .description.scene import Expect as Expect
     from .description.scene import History as History
@@ -71,6 +73,9 @@ if TYPE_CHECKING:
     from .description.shapes import Spline as Spline
     from .description.shapes import Straight as Straight
     from .description.springs import Spring as Spring
+    from .description.stretch_laws import StretchBilinear as StretchBilinear
+    from .description.stretch_laws import StretchPotential as StretchPotential
+    from .description.stretch_laws import StretchTable as StretchTable
     from .description.tendons import Coil as Coil
     from .description.tendons import Tendon as Tendon
     from .description.tendons import Way as Way
@@ -148,13 +153,15 @@ _PUBLIC = {
     "codegen.timestep": "TimeStep",
     "description.actuation": "Actuation Magnet MagneticField",
     "description.contacts": "Contact",
-    "description.laws": "Bilinear MomentTable Plateau Potential RambergOsgood Ribbon StressStrain",
+    "description.laws": "Bilinear MomentTable Plateau Potential RambergOsgood Ribbon Sadowsky StressStrain",
     "description.scene": "Analysis Expect History Load Member Motion Node Scene Until",
+    "description.relaxation": "Relaxation",
     "description.scenefile": "dump load",
     "description.formulas": "Formula",
     "description.sections": "CrossSection Polynomial Table",
     "description.shapes": "Arc Curvature Helix Spline Straight",
     "description.springs": "Spring",
+    "description.stretch_laws": "StretchBilinear StretchPotential StretchTable",
     "description.tendons": "Coil Tendon Way",
     "design.designing": "Design DesignAnswer find",
     "design.quasi_static": "QuasiStatic QuasiStaticAnswer",

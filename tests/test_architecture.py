@@ -53,6 +53,8 @@ ORDER = [
     "description.matrices",
     "description.formulas",
     "description.laws",
+    "description.stretch_laws",
+    "description.relaxation",
     "description.sections",
     "description.shapes",
     "description.changes",
@@ -84,6 +86,8 @@ ORDER = [
     "mechanics.beams",
     "mechanics.parts",
     "mechanics.laws",
+    "mechanics.stretch_laws",
+    "mechanics.relaxation",
     "mechanics.singles",
     "mechanics.load_terms",
     "mechanics.actuation",
@@ -335,7 +339,7 @@ DRAWING = ("plot", "animate")
 PYPLOT = "pictures.showing"
 """The module that imports pyplot, which looks for a window system, when a figure is to be shown."""
 
-DISPATCHERS = ("analyses", "outputs", "cli", "equilibria.statics", "description.laws")
+DISPATCHERS = ("analyses", "outputs", "cli", "equilibria.statics", "description.laws", "description.stretch_laws")
 """What chooses, by a scene or by the words of a command, among much of which a run needs little: it imports what it
 chose.  Potentials alone, of all that describes a scene, are expressions of CasADi."""
 

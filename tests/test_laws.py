@@ -697,6 +697,88 @@ def test_ribbon_by_shooting():
     assert np.abs(straight.position("B") - found.position("B")).max() > 1e-3
 
 
+def sadowsky(**more):
+    return {**RIBBON, "law": {"type": "sadowsky"}, **more}
+
+
+PLATE = RIBBON["E"] * RIBBON["height"] ** 3 / (12.0 * (1.0 - RIBBON["nu"] ** 2)) * RIBBON["width"]
+"""Plate stiffness of RIBBON times its width, N m2."""
+
+
+@pytest.mark.parametrize(("k", "t"), [(7.0, 2.0), (-3.0, 2.9), (2.0, -2.0), (1.0, 4.0), (0.0, 3.0)])
+def test_ribbon_of_sadowsky_has_its_energy(k, t):
+    exact = 0.5 * PLATE * ((k**2 + t**2) ** 2 / k**2 if abs(t) <= abs(k) else 4.0 * t**2)
+    # It is smoothed over 1e-3 1/m.
+    assert potential(sadowsky(), [t, 0.0, k]) == pytest.approx(exact, rel=1e-6)
+
+
+def test_ribbon_of_sadowsky_is_convex_and_has_no_corner():
+    law = CrossSection(**sadowsky()).law
+    function, rng = derivatives_of(law.form), np.random.default_rng(3)
+    rest = np.diag([2.0, 0.0, 1.0])
+    for x in rng.normal(size=(60, 3)) * np.exp(rng.uniform(-3, 6, size=(60, 1))):
+        bend = function(x, [])[2].full() + rest
+        assert np.linalg.eigvalsh(bend)[0] > -1e-12 * np.abs(bend).max()
+        # At the twist beyond which bending has no stiffness, from both sides.
+        at = np.array([np.hypot(x[2], 1.0), 0.0, x[2]])
+        sides = [function(at * [share, 1.0, 1.0], [])[1].full() for share in (1.0 - 1e-9, 1.0 + 1e-9)]
+        np.testing.assert_allclose(*sides, rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("t", [3.0, 6.0, 9.9])
+def test_ribbon_of_sadowsky_is_a_helix(t):
+    """Curvature k and twist t all along, under the force and the moment at its end that such a helix needs.
+
+    In section axes M = dW is constant, so that M' = w x M, w = (t, 0, k), is the moment of a force along w.
+    """
+    k, length = 10.0, 0.3
+    ratio, w = 1.0 + (t / k) ** 2, np.array([t, 0.0, k])
+    moment = PLATE * np.array([2.0 * ratio * t, 0.0, (2.0 * ratio - ratio**2) * k])
+    load = (k * moment[0] - t * moment[2]) / k * w
+    turned = Rotation.from_rotvec(w * length).as_matrix()
+    ends = [quad(lambda s, i=i: Rotation.from_rotvec(w * s).as_matrix()[i, 0], 0, length)[0] for i in range(3)]
+    loads = {"f": force(load.tolist()), "m": {"type": "moment", "node": "B", "value": (turned @ moment).tolist()}}
+    nodes = {"A": {"position": [0, 0, 0], "support": "clamped"}, "B": {"position": [length, 0, 0]}}
+    found = sfetcas.solve(scene(section=sadowsky(), nodes=nodes, loads=loads, dimension="space")).last
+    np.testing.assert_allclose(found.position("B"), ends, atol=1e-7)
+    np.testing.assert_allclose(found.along("beam", [0.1, 0.7])["curvature"], [w, w], atol=1e-5)
+
+
+def test_ribbons_of_vanishing_thickness_are_that_of_sadowsky():
+    """Of one plate stiffness: what the thickness changes falls with its root, and two of them tell the limit."""
+
+    def end(law, thick):
+        section = {**RIBBON, "height": thick, "E": RIBBON["E"] * (RIBBON["height"] / thick) ** 3, "law": {"type": law}}
+        one = scene(section=section, load=force([0.0, 0.03, -0.1]), dimension="space")
+        return sfetcas.solve(one.replace({"nodes.B.position": [0.1, 0, 0], "members.beam.b2": [0, 0, 1]})).last
+
+    found, thick, thin = end("sadowsky", 4e-4), *(end("audoly-neukirch", h).position("B") for h in (4e-5, 4e-7))
+    assert found.certificate.stable
+    np.testing.assert_allclose(found.position("B")[[0, 2]], ((10.0 * thin - thick) / 9.0)[[0, 2]], atol=4e-6)
+    assert np.abs(thick - found.position("B")).max() > 1e-4
+
+
+def test_ribbon_of_sadowsky_tells_where_it_has_no_stiffness():
+    """Twisted alone it needs 4 D w t, and bends as it likes; in the plane its stiffness is D w."""
+    nodes = {
+        "A": {"position": [0, 0, 0], "support": "clamped"},
+        "B": {
+            "position": [0.3, 0, 0],
+            "support": "slider",
+            "direction": [1, 0, 0],
+            "rotation": "hinge",
+            "axis": [1, 0, 0],
+        },
+    }
+    motions = {"turn": {"node": "B", "rotation": 1.0}}
+    found = sfetcas.solve(scene(section=sadowsky(), nodes=nodes, loads={}, motions=motions, dimension="space"))
+    assert found.last.reaction("B")[1][0] == pytest.approx(4.0 * PLATE / 0.3, rel=1e-6)
+    assert any("no stiffness against bending where the twist is larger than the" in note for note in found.last.notes)
+    bent = sfetcas.solve(scene(section=sadowsky(), load={"type": "moment", "node": "B", "value": PLATE})).last
+    np.testing.assert_allclose(bent.position("B")[:2], arc(1.0), atol=1e-7)
+    assert not any("stiffness" in note for note in bent.notes)
+
+
 # -- what is told and refused ----------------------------------------------------------------------------
 
 

@@ -31,8 +31,12 @@ __all__ = [
     "Potential",
     "RambergOsgood",
     "Ribbon",
+    "Sadowsky",
     "SectionLaw",
     "StressStrain",
+    "check_parameters",
+    "parameters_given",
+    "signed",
 ]
 
 About = Literal["b2", "b3", "both"]
@@ -90,6 +94,10 @@ class SectionLaw(Record):
         SceneError
             Names the key.
         """
+
+    def slack(self, section: Any, x: Array, change: Array) -> Array:
+        """Above 0 where changes (n, 3) of the curvatures, 1/m, at fractions x leave it without stiffness, (n,)."""
+        return np.full(len(x), -1.0)
 
     @property
     def stays_in_plane(self) -> bool:
@@ -250,8 +258,14 @@ class Plateau(_OneAxis):
         return np.stack([self._bending(section, x) * bent**2, bent], axis=1)
 
 
-def _signed(curvature: tuple[float, ...], values: tuple[float, ...], names: tuple[str, str]) -> bool:
-    """Check the knots of a curve through zero: rising, with zero among them; whether they begin there."""
+def signed(curvature: tuple[float, ...], values: tuple[float, ...], names: tuple[str, str]) -> bool:
+    """Check the knots of a curve through zero: rising, with zero among them; whether they begin there.
+
+    Raises
+    ------
+    SceneError
+        Names the key.
+    """
     if len(curvature) != len(values):
         found = f"found {len(values)} entries beside {len(curvature)} of {names[0]!r}"
         raise SceneError(f"{found}, accepted: one for each", (names[1],))
@@ -292,7 +306,7 @@ class MomentTable(_OneAxis):
 
     @model_validator(mode="after")
     def _monotone(self) -> MomentTable:
-        odd = _signed(self.curvature, self.moment, ("curvature", "moment"))
+        odd = signed(self.curvature, self.moment, ("curvature", "moment"))
         if self.about == "both" and not odd:
             raise SceneError("found curvatures of both signs about both axes, accepted: from 0 on", ("curvature",))
         return self
@@ -367,7 +381,7 @@ class StressStrain(_OneAxis):
 
     @model_validator(mode="after")
     def _curve(self) -> StressStrain:
-        _signed(self.strain, self.stress, ("strain", "stress"))
+        signed(self.strain, self.stress, ("strain", "stress"))
         return self
 
     @property
@@ -572,6 +586,60 @@ THIN = 5.0
 """Least width over height of a ribbon."""
 
 
+@final
+class Sadowsky(SectionLaw):
+    """A ribbon so thin that it bends without any stretching: the energy of Sadowsky, made convex; no more keys.
+
+    Per length it is half the plate stiffness times the width times (k^2 + t^2)^2 / k^2 where the twist t is below the
+    curvature k, and times 4 t^2 beyond, where the ribbon has no stiffness against bending (Freddi and others 2016).  It
+    has no length of its own; where it is straight it is smoothed over a thousandth of the curvature thickness over
+    squared width.  Bending about the other axis stays linear.
+    """
+
+    shaped: ClassVar[str] = "rectangle"
+
+    type: Literal["sadowsky"] = "sadowsky"
+
+    @property
+    def form(self) -> Form:
+        """No numbers."""
+        return Form("sadowsky", 3)
+
+    def values(self, section: Any, x: Array) -> Array:
+        """In units of the curvature over which it is smoothed."""
+        plate, bent = _plate(section, x)
+        return np.stack([plate * bent**2, bent], axis=1)
+
+    def stiffness(self, section: Any, values: Array, x: Array) -> Array:
+        """Of the smoothed potential: plate stiffness times width against bending, twice that against twist."""
+        plate, where = _plate(section, x)[0], np.zeros((2, 3, 3))
+        where[0, 0, 0], where[1, 2, 2] = 1.0, 1.0
+        twist, bending = (2.0 * plate - values[:, 0, 0], plate - values[:, 2, 2])
+        return values + twist[:, None, None] * where[0] + bending[:, None, None] * where[1]
+
+    def check(self, section: Any) -> None:
+        """As :meth:`Ribbon.check`."""
+        Ribbon().check(section)
+
+    def slack(self, section: Any, x: Array, change: Array) -> Array:
+        """How much the twist exceeds the curvature, as a share of it, (n,), for changes (n, 3) of both; above 0 there
+        is no stiffness against bending.
+        """
+        smooth = np.hypot(change[:, 2], values_of(_plate(section, x)[1]))
+        return np.abs(change[:, 0]) / smooth - 1.0
+
+
+def _plate(section: Any, x: Array) -> tuple[Array, Array]:
+    """Plate stiffness times width of a ribbon, N m2, and the curvature over which that of Sadowsky is smoothed, 1/m."""
+    young, half_width, half_height = section.fibres(x).T
+    width, thick = 2.0 * half_width, 2.0 * half_height
+    return young * thick**3 / (12.0 * (1.0 - section.nu**2)) * width, SMOOTHED * thick / width**2
+
+
+SMOOTHED = 1e-3
+"""Curvature over thickness / width^2 below which the ribbon of Sadowsky is smoothed; that of a plate strip is at 1."""
+
+
 def _potential(value: Any) -> str:
     """A function of CasADi, or one of Python that makes an expression, as a text."""
     from ..mathematics.potentials import text_of
@@ -583,8 +651,22 @@ def _potential(value: Any) -> str:
         raise ValueError(f"found {error.args[0] or say(value)}, accepted: {accepted}") from None
 
 
-def _parameters(value: Any) -> tuple[float, ...]:
+def parameters_given(value: Any) -> tuple[float, ...]:
+    """The parameters of a given potential, from a list."""
     return tuple(number(entry) for entry in listed(value, "a list of numbers"))
+
+
+def check_parameters(given: tuple[float, ...], wanted: int) -> None:
+    """Refuse more parameters than a given potential takes, or none where it takes some.
+
+    Raises
+    ------
+    SceneError
+        Names their number.
+    """
+    if len(given) > wanted or (wanted and not given):
+        found = f"found {len(given)} numbers, accepted: {wanted}, as the function takes them"
+        raise SceneError(found, ("parameters",))
 
 
 @final
@@ -607,13 +689,11 @@ class Potential(SectionLaw):
 
     type: Literal["potential"] = "potential"
     potential: Annotated[str, BeforeValidator(_potential)]
-    parameters: Annotated[tuple[float, ...], BeforeValidator(_parameters)] = ()
+    parameters: Annotated[tuple[float, ...], BeforeValidator(parameters_given)] = ()
 
     @model_validator(mode="after")
     def _sound(self) -> Potential:
-        if len(self.parameters) > self._wanted or (self._wanted and not self.parameters):
-            found = f"found {len(self.parameters)} numbers, accepted: {self._wanted}, as the function takes them"
-            raise SceneError(found, ("parameters",))
+        check_parameters(self.parameters, self._wanted)
         gradient, hessian = self._at_rest()
         if not np.isfinite([*gradient, *hessian.ravel()]).all():
             raise SceneError("found one that has no two derivatives at rest, accepted: a smooth one", ("potential",))
@@ -677,7 +757,7 @@ class Potential(SectionLaw):
 
 
 Law = Annotated[
-    Bilinear | RambergOsgood | Plateau | MomentTable | StressStrain | Ribbon | Potential,
+    Bilinear | RambergOsgood | Plateau | MomentTable | StressStrain | Ribbon | Sadowsky | Potential,
     Field(discriminator="type"),
 ]
 """A law of a section, told apart by its ``type``."""

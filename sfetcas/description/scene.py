@@ -300,6 +300,11 @@ class Scene(Record):
         """Whether the section of any flexible member couples forces with moments."""
         return any(member.shifted(self.sections) for member in self.members.values())
 
+    @cached_property
+    def relaxes(self) -> bool:
+        """Whether any member relaxes."""
+        return any(member.branches(self.sections) for member in self.members.values())
+
     @property
     def resolved_dimension(self) -> Literal["plane", "space"]:
         """How the scene is modelled: plane or space."""
@@ -468,6 +473,9 @@ def _check_tendons(scene: Scene) -> None:
             if law is not None and not way.holes:
                 found = f"found the member {way.member!r}, whose section has the law {law.type!r}"
                 raise SceneError(f"{found}, accepted: discs, or a member without a law", ("tendons", name))
+            if section is not None and not way.holes and scene.sections[section].stretch_law is not None:
+                found = f"found the member {way.member!r}, whose section has a law of stretch"
+                raise SceneError(f"{found}, accepted: discs, or a member without one", ("tendons", name))
         if tendon.may_be_slack and (scene.analysis.type != "static" or scene.analysis.equilibria == "all"):
             what = "'all' equilibria" if scene.analysis.type == "static" else f"the analysis {scene.analysis.type!r}"
             message = f"found a length that is given with {what}, in which no tendon becomes slack, accepted: pushes ="
@@ -563,6 +571,13 @@ def _check_sections(scene: Scene) -> None:
         if law is not None and member.type != "flexible":
             message = f"found a section with the law {law.type!r} of a {member.type} member"
             raise SceneError(f"{message}, accepted: of flexible members", ("members", name, "section"))
+        if member.type == "small" and member.section is not None and scene.sections[member.section].relaxation:
+            message = "found a section that relaxes of a small member, accepted: of flexible members"
+            raise SceneError(message, ("members", name, "section"))
+        softened = member.section is not None and scene.sections[member.section].stretch_law is not None
+        if softened and member.type != "flexible":
+            message = f"found a section with a law of stretch of a {member.type} member, accepted: of flexible members"
+            raise SceneError(message, ("members", name, "section"))
         if member.stiffness is not None and member.mass is None and _massive(scene):
             why = _need_of_mass(scene, "the member", "the member")
             raise SceneError(f"the key 'mass' is missing: {why}", ("members", name))
@@ -650,6 +665,9 @@ def _check_actuated(scene: Scene) -> None:
         if law is not None:
             message = f"found the member {actuation.member!r}, whose section has the law {law.type!r}, accepted: one"
             raise SceneError(f"{message} without a law", ("actuations", name, "member"))
+        if scene.members[actuation.member].branches(scene.sections):
+            message = f"found the member {actuation.member!r}, whose section relaxes, accepted: one that does not"
+            raise SceneError(message, ("actuations", name, "member"))
     if scene.magnets and not scene.fields:
         raise SceneError("found magnets without a field, accepted: with [fields.NAME]", ("magnets",))
     if scene.fields and not scene.magnets:
@@ -820,7 +838,9 @@ def _check_stretching_contact(scene: Scene, name: str, member: str) -> None:
     record, contact = scene.members[member], scene.contacts[name]
     if not record.stretches(scene.sections):
         return
-    if scene.sections[str(record.section)].compliance(0.5)[0, 1:].any():
+    if scene.sections[str(record.section)].stretch_law is not None:
+        found, accepted = "has a law of stretch", "members that stretch linearly, or not at all"
+    elif scene.sections[str(record.section)].compliance(0.5)[0, 1:].any():
         found, accepted = "shears", "members that do not shear: a section without GA2, GA3 and shear"
     elif contact.radius is not None:
         found, accepted = "stretches", f"obstacles that are not round, as this {contact.type} is, or no stretch"

@@ -18,6 +18,8 @@ from ..mathematics.interpolation import power_series
 from .formulas import SAMPLES, Formula
 from .laws import Law
 from .records import NotNegative, Number, Numbers, Record, number, say
+from .relaxation import Relaxations, check_relaxation
+from .stretch_laws import AnyStretchLaw
 
 __all__ = [
     "FINE",
@@ -387,11 +389,17 @@ class CrossSection(Record):
         Rotary inertia per length about b1, b2, b3, for modes and motions.  Default: zero.
     law : table
         Moments that are not proportional to the change of the curvature: a table with the key ``type``
-        (``bilinear``, ``ramberg-osgood``, ``plateau``, ``table``, ``stress-strain``, ``audoly-neukirch`` or, in
-        Python, ``potential``) and the keys of that law.  Default: linear.
+        (``bilinear``, ``ramberg-osgood``, ``plateau``, ``table``, ``stress-strain``, ``audoly-neukirch``,
+        ``sadowsky`` or, in Python, ``potential``) and the keys of that law.  Default: linear.
+    stretch_law : table
+        Axial force that is not proportional to the strain along: a table with the key ``type`` (``bilinear``, ``table``
+        or, in Python, ``potential``) and the keys of that law.  Default: linear.
     damping : s
         Retardation time of Kelvin and Voigt: a moment, and a force where it stretches or shears, is the stiffness
         times (the strain + ``damping`` times its rate).  With a law it is that of the stiffness at rest.
+    relaxation : list of tables
+        Branches ``ratio``, ``time`` of a viscoelastic section (standard linear solid, series of Prony), in motions and
+        modes.  The stiffness given is the long-term one, to which moments and forces relax.  Default: none.
     drag : N s/m²
         Force per length against the velocity, per unit of the velocity.
     shape : text
@@ -444,7 +452,9 @@ class CrossSection(Record):
     rhoA: Inertia | None = None
     rhoI: Annotated[tuple[Inertia, Inertia, Inertia], BeforeValidator(_three)] | None = None
     law: Law | None = None
+    stretch_law: AnyStretchLaw | None = None
     damping: NotNegative = 0.0
+    relaxation: Relaxations = ()
     drag: NotNegative = 0.0
     shape: Literal["rectangle", "circle", "tube"] | None = None
     stretch: bool = False
@@ -472,7 +482,7 @@ class CrossSection(Record):
             self._check_shape(self.shape)
         elif outlined := self._given((*_MATERIAL, *_DIMENSIONS, "shear_factor")) or self._switched():
             raise SceneError(f"found {outlined[0]!r} without a shape, accepted: shape = {' | '.join(_OUTLINES)}")
-        elif not numbers and not (self.law is not None and self.law.gives):
+        elif not numbers and self.stretch_law is None and not (self.law is not None and self.law.gives):
             raise SceneError(f"found nothing in it, accepted: {_KEYS} or a shape")
         if self.coupling is not None:
             self._check_coupling()
@@ -482,11 +492,28 @@ class CrossSection(Record):
             raise SceneError(f"found a mass centre without a mass, accepted: with {self._of_mass}", ("mass_center",))
         if self.law is not None:
             self._check_law(self.law)
+        check_relaxation(self.relaxation)
+        if self.stretch_law is not None:
+            self._check_stretch_law(self.stretch_law)
         return self
+
+    def _check_stretch_law(self, law: AnyStretchLaw) -> None:
+        given = "'EA'" if self.EA is not None else "stretch = true" if self.stretch else ""
+        if law.gives and given:
+            message = f"found {given} beside the law {law.type!r}, which says that stiffness, accepted: one of them"
+            raise SceneError(message, ("stretch_law",))
+        if not law.gives and not given:
+            key = "stretch = true" if self.shape is not None else "the key 'EA'"
+            message = f"the law {law.type!r} begins with a stiffness, accepted: with {key}"
+            raise SceneError(message, ("stretch_law",))
+        if self.relaxation:
+            raise SceneError("found beside 'relaxation', accepted: one of them", ("stretch_law",))
 
     def _check_law(self, law: Law) -> None:
         if self.coupling is not None:
             raise SceneError("found a law beside a coupling, accepted: one of them; a potential may couple", ("law",))
+        if self.relaxation:
+            raise SceneError("found a law beside 'relaxation', accepted: one of them", ("law",))
         if law.shaped and self.shape is None:
             accepted = "a shape" if law.shaped == "any" else f"shape = {law.shaped!r}"
             raise SceneError(f"found {law.type!r} without a shape, accepted: with {accepted}, E and G or nu", ("law",))
@@ -715,24 +742,25 @@ class CrossSection(Record):
     @property
     def stretches(self) -> bool:
         """Whether it stretches or shears."""
-        return bool(self._given(("EA", "GA2", "GA3", "stiffness_")) or self._switched())
+        return bool(self._given(("EA", "GA2", "GA3", "stiffness_", "stretch_law")) or self._switched())
 
     def compliance(self, x: ArrayLike) -> Floats:
-        """Strains by section forces along the member.
+        """Strains by section forces: x (n,) fractions of the length -> (n, 3) 1/EA, 1/GA2, 1/GA3 in 1/N.
 
-        Parameters
-        ----------
-        x : (n,)
-            Fractions of the length.
-
-        Returns
-        -------
-        (n, 3) - 1/EA, 1/GA2, 1/GA3 in 1/N (along b1, b2, b3), zero where it neither stretches nor shears; of a
-        stiffness matrix the diagonal of :meth:`compliance_of_forces`
+        Along b1, b2, b3; zero where it neither stretches nor shears; with a law of stretch that at rest; of a stiffness
+        matrix the diagonal of :meth:`compliance_of_forces`.
         """
         if self.stiffness_ is not None:
             found = self.compliance_of_forces(x)
             return np.stack([found[:, i, i] for i in range(3)], axis=1)
+        own = self._own_compliance(x)
+        if self.stretch_law is None or not self.stretch_law.gives:
+            return own
+        along = evaluate(0.0, x) + 1.0 / self.stretch_law.stiffness
+        return np.stack([along, own[:, 1], own[:, 2]], axis=1)
+
+    def _own_compliance(self, x: ArrayLike) -> Floats:
+        """What :meth:`compliance` is without the law of stretch."""
         if self.shape is None:
             values = [getattr(self, name) for name in ("EA", "GA2", "GA3")]
             return np.stack([evaluate(0.0, x) if v is None else 1.0 / evaluate(v, x) for v in values], axis=1)

@@ -11,6 +11,7 @@ from ..errors import SceneError
 from .formulas import Formula
 from .matrices import Mass, Stiffness, check_mass, check_stiffness
 from .records import Direction, NotNegative, Record, Vector, counted, listed, number, say, turn, whole
+from .relaxation import Relaxation
 from .sections import OFF_LINE, CrossSection, Polynomial, Quantity, Table, quantity
 from .shapes import Shape, Straight
 
@@ -267,6 +268,10 @@ class Member(Record):
     def stretches(self, sections: Mapping[str, CrossSection]) -> bool:
         """Whether it is flexible and its section stretches or shears."""
         return self.type == "flexible" and sections[str(self.section)].stretches
+
+    def branches(self, sections: Mapping[str, CrossSection]) -> tuple[Relaxation, ...]:
+        """The branches in which it relaxes where it is flexible; none of others."""
+        return sections[str(self.section)].relaxation if self.type == "flexible" else ()
 
     def node_at(self, x: float) -> str | None:
         """The node at an end of a flexible or rigid member, at the fraction 0 or 1 of its length; None within it."""

@@ -18,6 +18,7 @@ from ..mathematics.arrays import Array, first_of_largest
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import rotations_along, strained_like
 from ..mechanics.model import Model
+from ..mechanics.relaxation import relax
 from ..mechanics.tendon_friction import settle
 from .stages import StageEquations
 
@@ -139,6 +140,7 @@ def posed(model: Model, source: Equilibrium) -> State:
     )
     strained_like(model, y, origin, source.state.y)
     settle(model, q, y)
+    relax(model, q, y)
     unwrapped = model.unwrapping.angles(q, _unwrapped(model, source))
     return State(q, y, state.lam, unwrapped)
 
@@ -271,6 +273,12 @@ def _given(system: StageEquations, equations: Equations) -> tuple[Array, Array, 
             names += [("members", name, "spin")] * turns
     if not rows:
         return np.zeros((0, equations.unknowns)), np.zeros(0), []
+    # A motion begins relaxed, so that nothing of it relaxes yet.
+    for place in (number for number in model.segments.relaxing.flat if number >= 0):
+        own = moving_of[axes * place : axes * (place + 1)]
+        rows.append(own)
+        values.append(np.zeros(len(own)))
+        names += [("sections",)] * len(own)
     return np.concatenate(rows), np.concatenate(values), names
 
 

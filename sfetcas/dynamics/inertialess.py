@@ -36,6 +36,9 @@ def check_inertia(equations: Equations, matrix: Array) -> None:
     if equations.model.scene.stretches:
         message = "found 'idas', but strains of members that stretch or shear have no inertia of their own"
         raise SceneError(f"{message}, accepted: radau-3, radau-2, generalised-alpha", ("analysis", "integrator"))
+    if equations.model.scene.relaxes:
+        message = "found 'idas', but what relaxes in members has no inertia of its own"
+        raise SceneError(f"{message}, accepted: {OTHERS}", ("analysis", "integrator"))
     null = _null(matrix)
     if null is None:
         return
@@ -153,10 +156,11 @@ def _where(equations: Equations, unknowns: Array) -> list[str]:
     y, axes = model.positions.Y, model.element.axes
     moving = np.unique(y.row[np.isin(equations.rotation_unknowns + y.column, unknowns)] // axes)
     # Strains stand for their member.
+    segments = model.segments
     owners = {
-        model.segments.places[i]: part.member
-        for part in model.segments.parts
-        for i in model.segments.strains[part.elements].ravel().tolist()
+        segments.places[i]: part.member
+        for part in segments.parts
+        for i in [*segments.strains[part.elements].flat, *segments.relaxing[:, :, part.elements].flat]
         if i >= 0
     }
     places = [model.segments.places[i] for i in moving]

@@ -437,7 +437,7 @@ def _keeps_energy(model: Model) -> bool:
     scene = model.scene
     given = bool(scene.histories_used) or bool(scene.motions)
     given = given or not model.has_potential
-    taken = any(part.damping or part.drag for part in scene.sections.values())
+    taken = scene.relaxes or any(part.damping or part.drag for part in scene.sections.values())
     taken = taken or any(spring.damping for spring in scene.springs.values())
     return not (given or taken or scene.rotating is not None or any(node.drag for node in scene.nodes.values()))
 

@@ -21,6 +21,7 @@ import functools
 import casadi as ca
 import numpy as np
 
+from ..mathematics.arrays import Index
 from ..mathematics.constants import sparse, times
 from ..mathematics.linear import pattern, places_of
 from ..mechanics.expressions import Given, moved_by
@@ -78,9 +79,32 @@ class StageEquations(System):
         dual = [-DUAL_REGULARISATION / part for part in inertia]
         matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries, *dual)))
         left = ca.vec(residual.T)
-        # Entries differ by the square of the step: none is too small to divide by.
-        found = ca.solve(matrix, left[system.order], "qr", {"eps": 1e-300})
+        found = self._eliminated(matrix, left[system.order], stages)
         return -ca.reshape(found[system.back], stages, self.total).T
+
+    def _eliminated(self, matrix: ca.MX, right: ca.MX, stages: int) -> ca.MX:
+        """Solution of a system of all stages; what relaxes, which stands last, is eliminated first."""
+        n, count = (self.total - len(self._relaxing)) * stages, len(self._relaxing)
+        if not count:
+            return _solved(matrix, right)
+        # Each of these unknowns is coupled with itself alone, and with those of the elements.
+        own = ca.Sparsity.dense(stages, stages)
+        where = ca.diagcat(*[own] * count)
+        row, column = (n + part for part in places_of(where))
+        entries = matrix.nz[matrix.sparsity().get_nz((row + column * matrix.shape[0]).tolist())]
+        inverse = ca.MX(where, ca.vec(_inverse(stages).map(count)(ca.reshape(entries, stages**2, count))))
+        across, back = matrix[:n, n:], ca.mtimes(inverse, matrix[n:, :n])
+        rest = ca.mtimes(inverse, right[n:])
+        first = _solved(matrix[:n, :n] - ca.mtimes(across, back), right[:n] - ca.mtimes(across, rest))
+        return ca.vertcat(first, rest - ca.mtimes(back, first))
+
+    @functools.cached_property
+    def _relaxing(self) -> Index:
+        """Numbers of the unknowns that hold what has relaxed."""
+        model = self.model
+        places = model.segments.relaxing.ravel()
+        found = model.positions.retained[places[places >= 0]].ravel()
+        return np.asarray(self.equations.rotation_unknowns + found[found >= 0])
 
     def moved(self, q: list[ca.MX], step: ca.MX) -> tuple[list[ca.MX], ca.MX, ca.MX, ca.MX]:
         """Rotations of all stages after a step, changes of displacements and multipliers, and the largest movement."""
@@ -116,7 +140,9 @@ class StageEquations(System):
         rows, columns = (np.concatenate([static[k], coupled[k], np.arange(self.total)]) for k in (0, 1))
         both = np.unique(np.concatenate([columns * self.total + rows, rows * self.total + columns]))
         amd = pattern(self.total, both % self.total, both // self.total).amd()
-        place = np.argsort(np.array(amd, dtype=np.intp))
+        order = np.array(amd, dtype=np.intp)
+        last = np.isin(order, self._relaxing)
+        place = np.argsort(np.concatenate([order[~last], order[last]]))
         blocks = [(i, i, static, one + 1) for i in range(stages)]
         blocks += [(i, j, coupled, probe.coupled.count) for i in range(stages) for j in range(stages)]
         rows = np.arange(self.equations.unknowns, self.total)
@@ -133,6 +159,18 @@ class StageEquations(System):
         back = (place[:, None] * stages + np.arange(stages)).ravel()
         found = pattern(size, places % size, places // size)
         return Pattern(found, sums, np.argsort(back).tolist(), back.tolist())
+
+
+def _solved(matrix: ca.MX, right: ca.MX) -> ca.MX:
+    # Entries differ by the square of the step: none is too small to divide by.
+    return ca.solve(matrix, right, "qr", {"eps": 1e-300})
+
+
+@functools.cache
+def _inverse(size: int) -> ca.Function:
+    """The inverse of a matrix (size, size), both as columns."""
+    matrix = ca.SX.sym("matrix", size, size)
+    return ca.Function("inverse", [ca.vec(matrix)], [ca.densify(ca.vec(ca.inv(matrix)))], {"cse": True})
 
 
 DUAL_REGULARISATION = 1e-10

@@ -162,7 +162,7 @@ class System(Expressions):
             any((group.places < 0).any() for group in self.model.connections) or self.model.rotating_frame is not None
         )
         # Strains are displacements by their numbers alone.
-        moving = ~np.isin(positions.Y.row // axes, self.model.segments.strains)
+        moving = ~np.isin(positions.Y.row // axes, self.model.segments.without_position)
         free = self.places - len(self.model.segments.strained)
         if grounded or moving.sum() != axes * free:
             return None

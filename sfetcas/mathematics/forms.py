@@ -25,9 +25,9 @@ class Form:
     Attributes
     ----------
     name : str
-        ``bilinear``, ``plateau``, ``ramberg_osgood``, ``table``, ``ribbon`` or ``given``.
+        ``bilinear``, ``plateau``, ``ramberg_osgood``, ``table``, ``ribbon``, ``sadowsky`` or ``given``.
     about : int
-        Axis of bending: 2, 3 or :data:`BOTH`; of a ribbon the axis about which it is soft.
+        Axis of bending: 2, 3 or :data:`BOTH`; of a ribbon the axis about which it is soft; 1 of the strain along.
     count : int
         Knots of a table, parameters of a given function.
     odd : bool

@@ -38,8 +38,12 @@ def deviation(form: Form, x: ca.SX, p: ca.SX) -> ca.SX:
     """The deviation of a form from the quadratic potential at curvatures x (3,), with numbers p (size,)."""
     if form.name == "ribbon":
         return _ribbon(x[0], x[form.about - 1], p[0])
+    if form.name == "sadowsky":
+        return _sadowsky(x[0], x[form.about - 1])
     if form.name == "given":
-        return _beyond_quadratic(function_of(form.given), x, p)
+        function = function_of(form.given)
+        own = x if function.numel_in(0) == x.numel() else x[form.about - 1]
+        return _beyond_quadratic(function, own, p)
     square = ca.sumsqr(x[1:]) if form.about == BOTH else x[form.about - 1] ** 2
     if form.name == "table" and not form.odd:
         return _table(x[form.about - 1], p, form.count)
@@ -154,6 +158,18 @@ def _ribbon(twist: ca.SX, bending: ca.SX, poisson: ca.SX) -> ca.SX:
     return 0.5 * gaussian**2 * share * ca.if_else(v < 1.0, series, closed)
 
 
+def _sadowsky(twist: ca.SX, bending: ca.SX) -> ca.SX:
+    """What the energy of Sadowsky, made convex, is more than ``1/2 k^2 + t^2``; all over the plate stiffness.
+
+    With ``b^2 = k^2 + 1`` it is ``1/2 t^4 / b^2`` up to ``|t| = b``, and beyond it the same slopes go on.
+
+    Source: Freddi, Hornung, Mora and Paroni, Journal of Elasticity 123 (2016).
+    """
+    square, bent = twist**2, bending**2 + 1.0
+    low = ca.fmin(square, bent)
+    return 0.5 * (low**2 / bent + 2.0 * (square - low))
+
+
 # -- given functions -------------------------------------------------------------------------------------
 
 
@@ -163,10 +179,11 @@ def function_of(text: str) -> ca.Function:
     return ca.Function.deserialize(text)
 
 
-def text_of(value: Any) -> str:
+def text_of(value: Any, size: int = 3) -> str:
     """A function of CasADi, one of Python that makes an expression, or a text with one, as a text.
 
-    It takes three curvatures, and a list of parameters where it takes two arguments, and gives one number.
+    It takes ``size`` numbers, three curvatures or one strain, and a list of parameters where it takes two arguments,
+    and gives one number.
 
     Raises
     ------
@@ -180,14 +197,14 @@ def text_of(value: Any) -> str:
         except RuntimeError:
             raise ValueError("") from None
     elif callable(value) and not isinstance(value, ca.Function):
-        k, p = ca.SX.sym("k", 3), ca.SX.sym("p", MOST_PARAMETERS)
+        k, p = ca.SX.sym("k", size), ca.SX.sym("p", MOST_PARAMETERS)
         given = [k, p] if getattr(getattr(value, "__code__", None), "co_argcount", 1) == 2 else [k]
         try:
             function = ca.Function("potential", given, [ca.SX(value(*given))])
         except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError) as error:
             raise ValueError(f"a function that fails with {str(error).splitlines()[0]!r}") from None
     sized = isinstance(function, ca.Function) and function.n_in() in (1, 2) and function.n_out() == 1
-    if not sized or function.numel_in(0) != 3 or function.numel_out(0) != 1:
+    if not sized or function.numel_in(0) != size or function.numel_out(0) != 1:
         raise ValueError("")
     return str(function.serialize())
 
@@ -203,7 +220,10 @@ def parameters_of(text: str) -> int:
 
 
 def at_rest(text: str, p: Array) -> tuple[Array, Array]:
-    """Gradient (3,), N m, and second derivatives (3, 3), N m2, of a given potential at rest, with parameters p (n,)."""
+    """Gradient (3,), N m, and second derivatives (3, 3), N m2, of a given potential at rest, with parameters p (n,).
+
+    Of one strain (1,) and (1, 1), N.
+    """
     rest = _at_rest(text)
     gradient, hessian = (part.full() for part in rest(values_of(p)))
     if hasattr(p, "expression"):
@@ -215,16 +235,16 @@ def at_rest(text: str, p: Array) -> tuple[Array, Array]:
 @functools.cache
 def _at_rest(text: str) -> ca.Function:
     function = function_of(text)
-    k, p = ca.SX.sym("k", 3), ca.SX.sym("p", parameters_of(text))
+    k, p = ca.SX.sym("k", function.numel_in(0)), ca.SX.sym("p", parameters_of(text))
     hessian, gradient = ca.hessian(function(*[k, p][: function.n_in()]), k)
-    found = [ca.densify(ca.substitute(part, k, ca.SX.zeros(3))) for part in (gradient, hessian)]
+    found = [ca.densify(ca.substitute(part, k, ca.SX.zeros(k.numel()))) for part in (gradient, hessian)]
     return ca.Function("at_rest", [p], found)
 
 
 def _beyond_quadratic(function: ca.Function, x: ca.SX, p: ca.SX) -> ca.SX:
     """A given potential less its value and its quadratic part at rest."""
-    at = ca.SX.sym("at", 3)
+    at = ca.SX.sym("at", x.numel())
     value = function(at, p) if function.n_in() == 2 else function(at)
     hessian = ca.hessian(value, at)[0]
-    rest = [ca.substitute(part, at, ca.SX.zeros(3)) for part in (value, hessian)]
+    rest = [ca.substitute(part, at, ca.SX.zeros(x.numel())) for part in (value, hessian)]
     return ca.substitute(value, at, x) - rest[0] - 0.5 * ca.dot(x, ca.mtimes(rest[1], x))

@@ -27,8 +27,10 @@ from .laws import curvature_by_moment, law_of, least_stiffness
 from .loading import Loading
 from .magnetism import magnet_terms
 from .mesh import Touch
+from .relaxation import carried, relax
 from .singles import fibre_strain
 from .stations import Stations
+from .stretch_laws import least_tangent, strain_by_force, stretch_law_of
 from .tendon_friction import settle, turned_since
 from .tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
 from .terms import answers_of, energies_of
@@ -176,6 +178,8 @@ class Fields:
         if section.shifted:
             arms = section.arms(x)
             strain = strain + np.einsum("nji,nj->ni", arms, forces)
+        branches = self._branches(member, x)
+        strain = strain - branches[0]
         if section.law is not None:
             axes = [0, 1, 2] if model.space else [line.bending_axis - 1]
             near = self._changes(member, x)
@@ -188,10 +192,35 @@ class Fields:
                 strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
         result["curvature"] = line.curvatures(x) + self.natural(member, x) + strain
         if record.stretches(model.scene.sections) or section.shifted:
-            result["strain"] = np.einsum("nij,nj->ni", section.compliance_of_forces(x), forces)
+            result["strain"] = np.einsum("nij,nj->ni", section.compliance_of_forces(x), forces) - branches[1]
+            if section.stretch_law is not None:
+                near = self._strains_along(member, x)
+                result["strain"][:, 0] = strain_by_force(model.scene, member, x, forces[:, 0], near)
         if section.shifted:
             result["strain"] += np.einsum("nij,nj->ni", arms, strain)
         return result
+
+    def _strains_along(self, member: str, x: Array) -> Array:
+        """Strain along (n,) as the points of the elements say at fractions x."""
+        model, part = self.model, self.model.elements_of(member)
+        cuts, weight = model.mesh.cuts[member], model.beams.weight[part]
+        there = cuts[:-1, None] + np.diff(cuts)[:, None] * model.element.points
+        section = model.scene.sections[str(model.scene.members[member].section)]
+        compliance = section.compliance(there.ravel())[:, 0].reshape(there.shape) * model.scales.force
+        at = self._stations(member, x)
+        own = scaled_strains(model, self.state.y)[part][:, :, 0] * np.sqrt(compliance / weight)
+        return np.asarray(np.einsum("np,np->n", at.at_points, own[at.elements]))
+
+    def _branches(self, member: str, x: Array) -> tuple[Array, Array]:
+        """Moments (n, 3), N m, about b1, b2, b3 of what has not yet relaxed, and strains (n, 3) by such forces."""
+        model = self.model
+        found = carried(model, member, self.state.q, self.state.y)
+        if found is None:
+            return np.zeros((len(x), 3)), np.zeros((len(x), 3))
+        at = self._stations(member, x)
+        moment, strain = (np.einsum("np,npa->na", at.at_points, part[at.elements]) for part in found)
+        back = quaternion.conjugate(model.scene.center_lines[member].quaternions(x))
+        return quaternion.rotate(back, moment) * model.scales.moment, strain
 
     def section_forces(self, member: str, x: Array) -> Array:
         """Section forces (n, 3), N, along b1, b2, b3 at fractions x (n,) of a flexible or rigid member's length."""
@@ -257,7 +286,7 @@ class Fields:
             load = self._loading.loads[number - 1] if number else None
             batch = GroupBatch(self.model, group, energies_of(group.kind))
             energies = batch(self.q, self._nodal, self.state.unwrapped, load)[1].ravel()
-            found[group.elements if number else slice(None)] += energies
+            np.add.at(found, group.elements if number else np.arange(len(found)), energies)
         return found
 
     def magnet(self, name: str) -> dict[str, Any]:
@@ -686,7 +715,7 @@ class Fields:
 
         Looked for at the nodes of all elements and between them.
         """
-        model, scene, found = self.model, self.model.scene, []
+        model, scene, found = self.model, self.model.scene, self._beyond_stretch_laws()
         for name in model.members:
             law, line = law_of(scene, name), scene.center_lines[name]
             if law is None:
@@ -706,6 +735,15 @@ class Fields:
                     f"{law_name} ends at a curvature of {end:.6g} 1/m, and member {name!r} bends by {bent[i]:.6g} 1/m "
                     f"at {x[i]:.3g} of its length: beyond the end the law is a guess, with the slope there"
                 )
+            slack = law.slack(section, x, change)
+            i = first_of_largest(slack)
+            # A gap keeps rounding from deciding.
+            if slack[i] > tolerances.ALIKE:
+                found.append(
+                    f"{law_name} has no stiffness against bending where the twist is larger than the curvature, as "
+                    f"{abs(change[i, 0]):.4g} beside {abs(change[i, 2]):.4g} 1/m in member {name!r} at {x[i]:.3g} of "
+                    "its length: many shapes have the same energy there"
+                )
             if law.convex:
                 continue
             axes = [0, 1, 2] if model.space else [line.bending_axis - 1]
@@ -718,6 +756,33 @@ class Fields:
                     f"{x[i]:.3g} of its length: a finer mesh may find other shapes there"
                 )
         return tuple(found)
+
+    def _beyond_stretch_laws(self) -> list[str]:
+        """The same of the laws of stretch."""
+        model, scene, found = self.model, self.model.scene, list[str]()
+        for name in model.members:
+            law = stretch_law_of(scene, name)
+            if law is None:
+                continue
+            x, (low, high) = model.along(name), law.span
+            strain = self.along(name, x)["strain"][:, 0]
+            where = f"the law of stretch {law.type!r} of section {str(scene.members[name].section)!r}"
+            over = np.maximum(strain - high, low - strain)
+            i = first_of_largest(over)
+            if over[i] > tolerances.WRITTEN * max(abs(low), abs(high)):
+                end = high if strain[i] > high else low
+                found.append(
+                    f"{where} ends at a strain of {end:.6g}, and member {name!r} has {strain[i]:.6g} at {x[i]:.3g} of "
+                    "its length: beyond the end the law is a guess, with the slope there"
+                )
+            least = np.ones(len(x)) if law.convex else least_tangent(scene, name, x, strain)
+            i = int(np.argmin(least))
+            if least[i] < -tolerances.WRITTEN:
+                found.append(
+                    f"{where} is not convex at a strain of {strain[i]:.4g}, as of member {name!r} at {x[i]:.3g} of its "
+                    "length: a finer mesh may find other shapes there"
+                )
+        return found
 
     def pulled(self, member: str) -> float:
         """Axial force of a small member with two ends over its transverse stiffness times its length (``12 EI / L^2``).
@@ -854,6 +919,7 @@ def transferred(source: Any, state: State, target: Any) -> State:
     y = _by_name(source.positions.unknowns, state.y, target.positions.unknowns)
     strained_like(target, y, source, state.y)
     settle(target, q, y)
+    relax(target, q, y)
     lam = _by_name(source.row_names, state.lam, target.row_names)
     return State(q, y, lam, state.unwrapped)
 

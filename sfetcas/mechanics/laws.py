@@ -28,7 +28,7 @@ from .elements import Element, element_by_name
 from .parts import Parts
 from .terms import ARGUMENTS, One, Side, Term, name_of
 
-__all__ = ["AlongElement", "curvature_by_moment", "law_of", "laws_in", "least_stiffness"]
+__all__ = ["AlongElement", "curvature_by_moment", "law_of", "laws_in", "least_stiffness", "solved"]
 
 PLACE = 10
 """Numbers of a point in space before those of the form: energy, nine of the axes over the unit of curvature."""
@@ -212,7 +212,13 @@ def curvature_by_moment(scene: Scene, member: str, x: Array, moment: Array, near
     Newton's method from the changes ``near`` (n, 3).  ``axes`` are the numbers, from 0, of those about which the scene
     bends.  Where it does not lead to the moments, ``near`` itself is the answer.
     """
-    rest, values, derivatives = _stiffness_and_form(scene, member, x)
+    return solved(*_stiffness_and_form(scene, member, x), moment, near, axes)
+
+
+def solved(rest: Array, values: Array, derivatives: ca.Function, moment: Array, near: Array, axes: list[int]) -> Array:
+    """As :func:`curvature_by_moment`, with matrices at rest (n, 3, 3), the numbers (n, 2 + size) and the derivatives
+    of a form; also strains at which a law gives section forces.
+    """
     change = near.copy()
     size = np.abs(moment).max(initial=0.0) + np.abs(np.einsum("nij,nj->ni", rest, near)).max(initial=0.0)
     for _ in range(NEWTON_STEPS):
@@ -220,7 +226,9 @@ def curvature_by_moment(scene: Scene, member: str, x: Array, moment: Array, near
         miss = (moment - now)[:, axes]
         if not np.abs(miss).max(initial=0.0) > tolerances.DECIMAL * size:
             break
-        change[:, axes] += np.linalg.solve(slope[:, axes][:, :, axes], miss[..., None])[..., 0]
+        # Where a law has no stiffness the step is long, and leads nowhere.
+        firm = slope[:, axes][:, :, axes] + tolerances.WRITTEN * rest[:, axes][:, :, axes]
+        change[:, axes] += np.linalg.solve(firm, miss[..., None])[..., 0]
     now = _moment_and_slope(change, rest, values, derivatives)[0]
     met = np.abs((moment - now)[:, axes]).max(axis=1, initial=0.0) <= tolerances.WRITTEN * size
     return np.where(met[:, None], change, near)

@@ -162,6 +162,7 @@ class _Weigher:
             *self._points(mass, of_drag),
             *self._strains(time),
             *self._stretches(time),
+            *self._relaxations(time),
             *self._springs(time),
         ]
         return Masses(
@@ -365,6 +366,22 @@ class _Weigher:
             if delay:
                 places.append(model.segments.strains[model.elements_of(name)].ravel())
                 damping.append(np.full(len(places[-1]), delay / time))
+        sides, weights = np.concatenate(places)[:, None], np.concatenate(damping)
+        if not len(weights):
+            return []
+        each = np.repeat(weights[:, None], model.element.axes, axis=1)
+        nothing, data = np.zeros((len(weights), 0), np.intp), np.zeros((len(weights), 0))
+        return [Observables(Stretches(self.space), nothing, sides, data, np.zeros(each.shape), each)]
+
+    def _relaxations(self, time: float) -> list[Observables]:
+        """Dampers of the branches in which members relax: their energy is half the square of scaled strains."""
+        model, places, damping = self.model, [np.zeros(0, np.intp)], [np.zeros(0)]
+        for name in model.members if model.segments.relaxing.shape[1] else ():
+            part = model.elements_of(name)
+            for i, branch in enumerate(self.scene.members[name].branches(self.scene.sections)):
+                own = model.segments.relaxing[:, i, part].ravel()
+                places.append(own[own >= 0])
+                damping.append(np.full(len(places[-1]), branch.time / time))
         sides, weights = np.concatenate(places)[:, None], np.concatenate(damping)
         if not len(weights):
             return []

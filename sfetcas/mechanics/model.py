@@ -33,9 +33,11 @@ from .mesh import Mesh
 from .parts import Parts
 from .positions import Positions, entries, place_nodes
 from .pressure import is_pressure
+from .relaxation import relaxations_in
 from .rotating_frame import RotatingFrame, with_rotating_frame
 from .rotations import RotationFreedom, Rotations, number_rotations
 from .segments import Segments, cut_members
+from .stretch_laws import stretch_laws_in
 from .tendon_friction import rubbing_in
 from .tendon_terms import tendons_in
 from .terms import Group, One, grouped
@@ -48,6 +50,8 @@ SOURCES: list[Callable[[Parts], Iterable[One]]] = [
     connections_in,
     touches_in,
     laws_in,
+    stretch_laws_in,
+    relaxations_in,
     loads_in,
     actuations_in,
     magnets_in,
@@ -354,11 +358,16 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         blocks.append(Block("norms", free + about, "a quaternion of a free rotation is unit; held ones need no row"))
     else:
         blocks.append(Block("angles", free, f"1 for each of {counted(free, 'free rotation')}: {model.reason}"))
-    strains = sum(map(len, model.segments.strained.values()))
+    relaxing = {model.segments.places[i] for i in model.segments.relaxing.flat if i >= 0}
+    strains = sum(len(part) for name, part in model.segments.strained.items() if name not in relaxing)
     if strains:
         blocks.append(
             Block("strains", strains, "stretch and shear at the integration points of members that have them")
         )
+    if relaxing:
+        count = sum(len(model.segments.strained[name]) for name in relaxing)
+        blocks.append(Block("relaxed strains", count, "at the integration points, for each branch of what relaxes"))
+        strains += count
     if len(model.positions.unknowns) > strains:
         why = "nodal assembly" if model.assembly == "nodal" else "nothing but guides hold the structure"
         if model.assembly != "nodal" and model.segments.retained:

@@ -93,7 +93,7 @@ class Strains(Term):
 @final
 @dataclass(frozen=True)
 class Stretches(Term):
-    """The scaled strains of a point, whose rates Kelvin-Voigt damping resists."""
+    """The scaled strains of a point, or what of them has relaxed, whose rates a damper resists."""
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:

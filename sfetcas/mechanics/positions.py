@@ -65,9 +65,6 @@ def _slides(scene: Scene, name: str) -> bool:
     return node.slides and not any(drives(node, displacement) for displacement in moved)
 
 
-STRAINS = ("along", "across", "across b3")
-"""Names of the components of a strain."""
-
 Source = tuple[str, int]
 """What a displacement depends on: the chord (E), unknowns (Y) or prescribed displacement (B) of a number."""
 
@@ -183,7 +180,7 @@ class _Placing:
         if name in self.segments.strained:
             chosen = list(self.segments.strained[name])
             self.retained[self.number[name], chosen] = first + np.arange(len(chosen))
-            self.labels += [f"{name}, {STRAINS[i]}" for i in chosen]
+            self.labels += [f"{name}, {component}" for component in self.segments.strained[name].values()]
             self.places[name] = _Place({("Y", first): self.eye[:, chosen]})
             return
         self.retained[self.number[name]] = first + np.arange(self.axes)

@@ -58,8 +58,10 @@ class Segments:
     strains : ndarray (elements, points)
         Numbers of the places that hold the scaled strains of the points of elements in place of a displacement, -1 in
         members that do not stretch; no points where none does.
-    strained : mapping of str to tuple of int
-        Components that are unknown at each of these places.
+    relaxing : ndarray (2, branches, elements, points)
+        The same of the part of the changes of curvature (0) and of the strains (1) that has relaxed in each branch.
+    strained : mapping of str to mapping of int to str
+        Components that are unknown at each of these places, which are the last ones, with their names.
     """
 
     places: tuple[str, ...]
@@ -68,12 +70,18 @@ class Segments:
     owner: Index
     ends: Mapping[tuple[str, int], str]
     strains: Index
-    strained: Mapping[str, tuple[int, ...]]
+    relaxing: Index
+    strained: Mapping[str, Mapping[int, str]]
 
     def alike(self, other: Segments) -> bool:
         """Whether other segments of the same scene join the same places by as many elements."""
         mine, its = ((one.places, one.retained, one.parts, one.strained) for one in (self, other))
         return mine == its
+
+    @property
+    def without_position(self) -> Index:
+        """Numbers of the places that hold strains."""
+        return np.arange(len(self.places) - len(self.strained), len(self.places))
 
     @property
     def first(self) -> Index:
@@ -255,27 +263,74 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     sizes = [part.elements.stop - part.elements.start for part in parts]
     owner = np.repeat(np.arange(len(parts)), sizes)
     strains, strained = _strained(scene, mesh, len(places), len(owner))
+    relaxing = _relaxing(scene, mesh, len(places), len(owner), strained)
     return Segments(
-        (*places, *strained), frozenset(retained | set(strained)), tuple(parts), owner, ends, strains, strained
+        (*places, *strained),
+        frozenset(retained | set(strained)),
+        tuple(parts),
+        owner,
+        ends,
+        strains,
+        relaxing,
+        strained,
     )
 
 
-def _strained(scene: Scene, mesh: Mesh, first: int, elements: int) -> tuple[Index, dict[str, tuple[int, ...]]]:
+STRAINS = ("along", "across", "across b3")
+"""Names of the components of a strain."""
+
+
+def _strained(scene: Scene, mesh: Mesh, first: int, elements: int) -> tuple[Index, dict[str, Mapping[int, str]]]:
     """:attr:`Segments.strains` and :attr:`Segments.strained`; places are numbered from ``first``."""
-    strained: dict[str, tuple[int, ...]] = {}
+    strained: dict[str, Mapping[int, str]] = {}
     if not scene.stretches:
         return np.zeros((elements, 0), np.intp), strained
     strains, begin = np.full((elements, mesh.order + 1), -1), 0
-    points = (interpolation.gauss if mesh.gauss else interpolation.lobatto)(mesh.order + 1)[0]
-    space = scene.resolved_dimension == "space"
+    points = _points(mesh)
     for name in mesh.cuts:
         cuts, member = mesh.cuts[name], scene.members[name]
         if member.stretches(scene.sections):
-            yielding = scene.sections[str(member.section)].compliance(np.array([0.5]))[0] > 0.0
-            components = tuple(np.flatnonzero(yielding[scene.center_lines[name].strained_axes(space)]).tolist())
+            components = _yielding(scene, name)
             for e in range(len(cuts) - 1):
                 for k, point in enumerate(points):
                     strains[begin + e, k] = first + len(strained)
                     strained[f"strain of {name}, element {e + 1}, at {point:.6g} of it"] = components
         begin += len(cuts) - 1
     return strains, strained
+
+
+def _points(mesh: Mesh) -> Array:
+    return (interpolation.gauss if mesh.gauss else interpolation.lobatto)(mesh.order + 1)[0]
+
+
+def _yielding(scene: Scene, name: str) -> dict[int, str]:
+    """Components in which a member stretches or shears."""
+    yielding = scene.sections[str(scene.members[name].section)].compliance(np.array([0.5]))[0] > 0.0
+    axes = scene.center_lines[name].strained_axes(scene.resolved_dimension == "space")
+    return {i: STRAINS[i] for i in np.flatnonzero(yielding[axes]).tolist()}
+
+
+def _relaxing(scene: Scene, mesh: Mesh, first: int, elements: int, strained: dict[str, Mapping[int, str]]) -> Index:
+    """:attr:`Segments.relaxing`, with the places added to ``strained``: of motions and vibrations alone.
+
+    In equilibrium everything has relaxed, so that nothing is unknown.
+    """
+    branches = {name: scene.members[name].branches(scene.sections) for name in mesh.cuts}
+    count = max(map(len, branches.values()), default=0) if mesh.places else 0
+    if scene.rotating is not None and not scene.analysis.moves:
+        count = 0
+    found, begin = np.full((2, count, elements, mesh.order + 1 if count else 0), -1), 0
+    about = dict(enumerate(("b1", "b2", "b3"))) if scene.resolved_dimension == "space" else {0: "z"}
+    for name, cuts in mesh.cuts.items() if count else ():
+        kinds: list[tuple[str, Mapping[int, str]]] = [("bending", {i: f"about {axis}" for i, axis in about.items()})]
+        if scene.members[name].stretches(scene.sections):
+            kinds.append(("strain", _yielding(scene, name)))
+        for kind, (what, components) in enumerate(kinds):
+            for i in range(len(branches[name])):
+                for e in range(len(cuts) - 1):
+                    for k, point in enumerate(_points(mesh)):
+                        found[kind, i, begin + e, k] = first + len(strained)
+                        place = f"relaxed {what} {i + 1} of {name}, element {e + 1}, at {point:.6g} of it"
+                        strained[place] = components
+        begin += len(cuts) - 1
+    return found

@@ -110,7 +110,9 @@ class Argument:
         """Least and largest accepted value: the range; else above zero for stiffness, from zero for masses, tension."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
-        entry = ".law." in self.name and (self.components is not None or self.name[-1].isdigit())
+        entry = (".law." in self.name or ".stretch_law." in self.name) and (
+            self.components is not None or self.name[-1].isdigit()
+        )
         signed = entry or any(part in self.name for part in SIGNED)
         of_section = self.name.startswith("sections.") and not signed
         light = of_section and self.name.split(".")[2] in MAY_BE_ZERO

@@ -167,6 +167,9 @@ def motion_functions(
         The scene has no such numbers or answers, or a rotation in it has no inertia.
     """
     check_scene(scene, "motion_functions({}, ...)")
+    if scene.relaxes:
+        message = "motion_functions: found members that relax, whose relaxed strains have no accelerations"
+        raise SceneError(f"{message}, accepted: sections without 'relaxation'")
     spans = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters, (-np.inf, np.inf))
     variables = [Variable(name, low, high) for name, (low, high) in spans.items()]
     controls = [Control(name) for name in inputs]

@@ -177,7 +177,15 @@ class OptimalControl(Problem):
         """Require rest at the end: zero velocity, and equilibrium under constant controls; returns their symbols.
 
         Vibrations too fast for the intervals are excepted; the replay shows what remains of them.
+
+        Raises
+        ------
+        SceneError
+            A member relaxes, which comes to rest only in infinite time.
         """
+        if self.scene.relaxes:
+            message = "rest_at_end: found members that relax, which come to rest in infinite time only"
+            raise SceneError(f"{message}, accepted: conditions at the end for what is wanted there")
         self.statement.resting = True
         for one in self.statement.controls:
             self.statement.rest(one.name)
