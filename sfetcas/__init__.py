@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from .description.contacts import Contact as Contact
     from .description.formulas import Formula as Formula
     from .description.laws import Bilinear as Bilinear
+    from .description.laws import ElasticPlastic as ElasticPlastic
     from .description.laws import MomentTable as MomentTable
     from .description.laws import Plateau as Plateau
     from .description.laws import Potential as Potential
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
     from .description.laws import Ribbon as Ribbon
     from .description.laws import Sadowsky as Sadowsky
     from .description.laws import StressStrain as StressStrain
+    from .description.laws import Superelastic as Superelastic
     from .description.relaxation import Relaxation as Relaxation
     from .description.scene import Analysis as Analysis
     from .description.scene import Expect as Expect
@@ -153,7 +155,8 @@ _PUBLIC = {
     "codegen.timestep": "TimeStep",
     "description.actuation": "Actuation Magnet MagneticField",
     "description.contacts": "Contact",
-    "description.laws": "Bilinear MomentTable Plateau Potential RambergOsgood Ribbon Sadowsky StressStrain",
+    "description.laws": "Bilinear ElasticPlastic MomentTable Plateau Potential RambergOsgood Ribbon Sadowsky "
+    "StressStrain Superelastic",
     "description.scene": "Analysis Expect History Load Member Motion Node Scene Until",
     "description.relaxation": "Relaxation",
     "description.scenefile": "dump load",

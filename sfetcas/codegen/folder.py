@@ -96,7 +96,7 @@ def export(
     --------
     >>> export(scene, "tip", arguments=["loads.tip.value"])       # doctest: +SKIP
     """
-    check_scene(scene, "export({}, ...)")
+    check_scene(scene, "export({}, ...)", steps=False)
     path = Path(folder)
     check_name(name)
     check_folder(path, overwrite=overwrite)

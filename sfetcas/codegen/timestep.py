@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..description.showing import shown
 from ..dynamics.integrating import Memory, Stepper
 from ..dynamics.methods import Method
@@ -174,6 +174,7 @@ def time_step(
     SceneError
         The scene or its integrator cannot be exported, or it does not have an argument or result that was asked for.
     """
+    check_scene(scene, "export({}, ...)", steps=False)
     simulation = motion_of(scene, settings or Settings())
     method = _method(simulation)
     scene = simulation.scene

@@ -146,6 +146,7 @@ members.NAME.bending_stress at | Pa | | statics, motion, parameters | E times th
 members.NAME.velocity at | m/s | x y z | motion | of the centre line; not of small members
 members.NAME.angular_velocity at | rad/s | x y z | motion | of the sections; not of small members
 members.NAME.energy | J | | statics, motion, parameters | strain energy of a member that is not rigid
+members.NAME.dissipated | J | | statics, motion | since it was undeformed, of one whose law has memory
 members.NAME.largest_bending_strain | | | statics, motion | along the whole member
 members.NAME.largest_bending_stress | Pa | | statics, motion | along the whole member
 springs.NAME.angle | rad | | all | of a rotational one, counting turns
@@ -169,6 +170,7 @@ contacts.NAME.at | | | statics | fraction of the length, or [from, to]; null whe
 contacts.NAME.gap | m | | statics | smallest distance
 contacts.NAME.member | | | statics | which it touches; all four are lists where it touches more than once
 energy.elastic | J | | all | of members, springs and tendons
+energy.dissipated | J | | statics, motion | of members whose laws have memory, since they were undeformed
 energy.loads | J | | statics, motion, parameters | from the undeformed scene
 energy.total | J | | statics, motion, parameters | sum of all that there are
 energy.potential | J | | statics, parameters | another name of the total of an equilibrium
@@ -204,6 +206,7 @@ APPLIES: dict[str, Callable[[Any, Any], bool]] = {
     "members.NAME.velocity": lambda scene, member: member.type != "small",
     "members.NAME.angular_velocity": lambda scene, member: member.type != "small",
     "members.NAME.energy": lambda scene, member: member.type != "rigid",
+    "members.NAME.dissipated": lambda scene, member: member.remembers(scene.sections),
     "springs.NAME.angle": lambda scene, spring: spring.type == "rotational",
     "springs.NAME.moment": lambda scene, spring: spring.type == "rotational",
     "springs.NAME.travel": lambda scene, spring: spring.type == "translational",

@@ -25,6 +25,7 @@ from .records import Number, Numbers, Positive, Record, listed, number, say
 
 __all__ = [
     "Bilinear",
+    "ElasticPlastic",
     "Law",
     "MomentTable",
     "Plateau",
@@ -34,6 +35,7 @@ __all__ = [
     "Sadowsky",
     "SectionLaw",
     "StressStrain",
+    "Superelastic",
     "check_parameters",
     "parameters_given",
     "signed",
@@ -55,6 +57,9 @@ class SectionLaw(Record):
 
     convex: ClassVar[bool] = True
     """Whether its potential is convex at every curvature."""
+
+    remembers: ClassVar[bool] = False
+    """Whether its moments depend on the curvatures of the steps before."""
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -640,6 +645,242 @@ SMOOTHED = 1e-3
 """Curvature over thickness / width^2 below which the ribbon of Sadowsky is smoothed; that of a plate strip is at 1."""
 
 
+class _Remembering(_OneAxis):
+    """A law with memory: of the moment about an axis, or of the stress of the fibres of a shape."""
+
+    remembers: ClassVar[bool] = True
+
+    moment: Positive | None = None
+    stress: Positive | None = None
+    ratio: Positive
+    about: About = "b3"
+
+    @property
+    def shaped(self) -> str:  # type: ignore[override]
+        """Any shape where stresses are given; none is needed where moments are."""
+        return "" if self.stress is None else "any"
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Any:
+        if (self.moment is None) == (self.stress is None):
+            found = "neither 'moment' nor 'stress'" if self.moment is None else "'moment' and 'stress'"
+            raise SceneError(f"found {found}, accepted: one of them")
+        if not self.ratio < 1.0:
+            raise SceneError(f"found {self.ratio:g}, accepted: below 1", ("ratio",))
+        return self
+
+    def check(self, section: Any) -> None:
+        """Refuse an axis that the shape does not have.
+
+        Raises
+        ------
+        SceneError
+            Names the key.
+        """
+        super().check(section)
+        if self.stress is None:
+            return
+        if section.shape == "rectangle" and self.about == "both":
+            raise SceneError("found 'both' with a rectangle, accepted: 'b2' or 'b3'", ("about",))
+        if section.shape != "rectangle" and self.about != "both":
+            raise SceneError(f"found {self.about!r} with a {section.shape}, accepted: 'both'", ("about",))
+
+    @property
+    @abc.abstractmethod
+    def material(self) -> list[Any]:
+        """Numbers of the material, see :mod:`~sfetcas.mathematics.hysteresis`."""
+
+    @property
+    @abc.abstractmethod
+    def material_name(self) -> str:
+        """Its name there."""
+
+    @property
+    def form(self) -> Form:
+        """The material, and fibres that remember."""
+        count = 1 if self.stress is None else len(_fibres_of("circle" if self.axis == BOTH else "rectangle", 0.0))
+        return Form(self.material_name, self.axis, count, spread=self.axis == BOTH and self.stress is not None)
+
+    def values(self, section: Any, x: Array) -> Array:
+        """In units of the end of the first elastic range; nothing is remembered."""
+        bending = self._bending(section, x)
+        if self.stress is None:
+            assert self.moment is not None
+            bent, rows = self.moment / bending, np.ones((len(x), 2))
+        else:
+            young, *reach = section.fibres(x).T
+            bent = self.stress / (young * reach[1 if self.axis == BOTH else self.axis - 2])
+            inner = np.zeros(len(x))
+            if section.shape == "tube":
+                outer, inside = section.radii(x)
+                inner = values_of(inside / outer)
+            rows = np.stack([_fibres_of(section.shape, float(share)).T.ravel() for share in inner])
+        material = numbers([self.material] * len(x)).reshape(len(x), -1)
+        units = np.stack([bending * bent**2, bent], axis=1)
+        return numbers(np.concatenate([units, material, rows, np.zeros((len(x), self.form.memory))], axis=1))
+
+
+FIBRES = 12
+"""Fibres of half the height of a rectangle: the plastic moment is met to 0.1 %."""
+
+ROUND_FIBRES = (3, 10)
+"""Rings of fibres of a round section, and fibres on half of each."""
+
+
+@functools.lru_cache(maxsize=256)
+def _fibres_of(shape: str, inner: float) -> Array:
+    """Weights, and places over the reach of the section, of the fibres of half a section, (n, 2) or (n, 3).
+
+    The weights make the second moment 1.  The other half has the opposite strains and stresses.
+    """
+    if shape == "rectangle":
+        # Midpoints of equal parts, of which those of no kink leave the same error each.
+        y = (np.arange(FIBRES) + 0.5) / FIBRES
+        return np.stack([np.ones(FIBRES) / np.sum(y**2), y], axis=1)
+    rings, count = ROUND_FIBRES
+    points, weights = gauss(rings)
+    radius = inner + (1.0 - inner) * points
+    angle = (np.arange(count) + 0.5) * np.pi / count
+    share = np.repeat(weights * radius, count)
+    # Axes b2 and b3: bending about b3 strains by minus the place along b2.
+    y, z = (np.outer(radius, part(angle)).ravel() for part in (np.cos, np.sin))
+    return np.stack([share / np.sum(share * y**2), z, -y], axis=1)
+
+
+@final
+class ElasticPlastic(_Remembering):
+    """Bending that is elastic up to a moment, then plastic with a share of the stiffness, and unloads elastically.
+
+    It is linear kinematic hardening: the elastic range stays as wide as it is, and moves.
+
+    Parameters
+    ----------
+    about : text
+        Axis of bending: ``b2``, ``b3``, or ``both`` for a round section, by the vector of both curvatures.
+    moment : N m
+        Moment at which plastic bending begins, of either sign; or ``stress``.
+    stress : N/m²
+        With a shape: stress at which its fibres begin to yield.  A rectangle needs an axis, a circle or a tube
+        ``both``.
+    ratio : 1
+        Stiffness beyond over that before, above 0 and below 1; with ``stress`` that of the fibres.
+    """
+
+    type: Literal["elastic-plastic"] = "elastic-plastic"
+
+    @property
+    def material_name(self) -> str:
+        """A slider beside a spring."""
+        return "sliders"
+
+    @property
+    def material(self) -> list[Any]:
+        """The ratio."""
+        return [self.ratio]
+
+
+@final
+class Superelastic(_Remembering):
+    """Bending with a plateau on loading and a lower one on unloading, from which it comes back without a rest.
+
+    It has the stiffness of the section before and beyond the plateaus, and on unloading between them.
+
+    Parameters
+    ----------
+    about : text
+        Axis of bending: ``b2``, ``b3``, or with ``stress`` ``both``.
+    moment : N m
+        Moment at which the plateau on loading begins, of either sign; or ``stress``.
+    curvature : 1/m
+        With ``moment``: change of the curvature at which that plateau ends.
+    stress : N/m²
+        With a shape: stress at which the plateau of its fibres begins.  A rectangle needs an axis, a circle or a tube
+        ``both``.
+    strain : 1
+        With ``stress``: strain at which that plateau ends.
+    unloading : N m, N/m²
+        Moment, or with ``stress`` stress, at which the plateau on unloading ends, above 0 and below that at which the
+        one on loading begins.
+    ratio : 1
+        Stiffness on the plateaus over that before, above 0 and below 1.
+    """
+
+    type: Literal["superelastic"] = "superelastic"
+    curvature: Positive | None = None
+    strain: Positive | None = None
+    unloading: Positive
+
+    @model_validator(mode="after")
+    def _ends(self) -> Superelastic:
+        key, other, begins = (
+            ("curvature", "strain", "moment") if self.stress is None else ("strain", "curvature", "stress")
+        )
+        if getattr(self, key) is None:
+            raise SceneError(f"the key {key!r} is missing: with {begins!r} it says where the plateau ends")
+        if getattr(self, other) is not None:
+            raise SceneError(f"found {other!r} beside {begins!r}, accepted: {key!r}")
+        if not self.unloading < self._begin:
+            found = f"found {self.unloading:g} beside a {begins} of {self._begin:g}"
+            raise SceneError(f"{found}, accepted: below it", ("unloading",))
+        if self.stress is None and self.about == "both":
+            raise SceneError("found 'both' with 'moment', accepted: 'b2' or 'b3', or 'stress' with a shape", ("about",))
+        return self
+
+    @property
+    def _begin(self) -> float:
+        """Moment or stress at which the plateau on loading begins."""
+        begin = self.moment if self.stress is None else self.stress
+        assert begin is not None
+        return begin
+
+    @property
+    def _end(self) -> float:
+        """Change of the curvature, or strain, at which it ends."""
+        end = self.curvature if self.stress is None else self.strain
+        assert end is not None
+        return end
+
+    @property
+    def material_name(self) -> str:
+        """A transformation."""
+        return "superelastic"
+
+    @property
+    def material(self) -> list[Any]:
+        """Nothing: the length of the plateau needs the section."""
+        return [0.0, 0.0, 0.0, 0.0]
+
+    def _length(self, section: Any, x: Array) -> Array:
+        """Where the plateau on loading ends over where it begins, (n,)."""
+        if self.stress is None:
+            return numbers(self._end * self._bending(section, x) / self._begin)
+        return numbers(self._end * section.fibres(x)[:, 0] / self._begin)
+
+    def check(self, section: Any) -> None:
+        """Refuse a plateau that ends before it begins.
+
+        Raises
+        ------
+        SceneError
+            Names the key.
+        """
+        super().check(section)
+        key = "curvature" if self.stress is None else "strain"
+        least = float(values_of(self._length(section, np.linspace(0.0, 1.0, 9))).min())
+        if not least > 1.0:
+            found = f"found {getattr(self, key):g}, {least:.6g} times that at which the plateau begins"
+            raise SceneError(f"{found}, accepted: above it", (key,))
+
+    def values(self, section: Any, x: Array) -> Array:
+        """In units of the end of the first elastic range; nothing is remembered."""
+        found = super().values(section, x)
+        strain = (self._length(section, x) - 1.0) * (1.0 - self.ratio)
+        lower = self.unloading / self._begin
+        hardening = strain**2 * (self.ratio / (1.0 - self.ratio))
+        material = np.stack([strain, hardening, 0.5 * strain * (1.0 + lower), 0.5 * strain * (1.0 - lower)], axis=1)
+        return numbers(np.concatenate([found[:, :2], material, found[:, 6:]], axis=1))
+
+
 def _potential(value: Any) -> str:
     """A function of CasADi, or one of Python that makes an expression, as a text."""
     from ..mathematics.potentials import text_of
@@ -757,7 +998,16 @@ class Potential(SectionLaw):
 
 
 Law = Annotated[
-    Bilinear | RambergOsgood | Plateau | MomentTable | StressStrain | Ribbon | Sadowsky | Potential,
+    Bilinear
+    | RambergOsgood
+    | Plateau
+    | MomentTable
+    | StressStrain
+    | Ribbon
+    | Sadowsky
+    | ElasticPlastic
+    | Superelastic
+    | Potential,
     Field(discriminator="type"),
 ]
 """A law of a section, told apart by its ``type``."""

@@ -27,6 +27,7 @@ from .matrices import check_inertia, check_rigid_motion
 from .moving import check_beginning, check_driving, check_masses, check_no_contact, check_velocities
 from .obstacles import check_start, members_of, obstacle
 from .records import Named, Record, Vector, brief, counted, number, say, unknown
+from .remembering import check_memory, refuse_memory, remembering_section
 from .sections import CrossSection
 from .shapes import CenterLine, place
 from .showing import named, number_in_words, shown
@@ -304,6 +305,11 @@ class Scene(Record):
     def relaxes(self) -> bool:
         """Whether any member relaxes."""
         return any(member.branches(self.sections) for member in self.members.values())
+
+    @cached_property
+    def remembers(self) -> bool:
+        """Whether the law of any member's section has memory, so that each step has to come after another."""
+        return bool(remembering_section(self))
 
     @property
     def resolved_dimension(self) -> Literal["plane", "space"]:
@@ -892,13 +898,14 @@ def _check_expect(scene: Scene) -> None:
             raise SceneError(f"found {expect.step:g}, accepted: {accepted}", ("expect", str(i), "step"))
 
 
-def check_scene(value: object, call: str) -> None:
+def check_scene(value: object, call: str, *, steps: bool = True) -> None:
     """Refuse an argument that is no scene.
 
     Parameters
     ----------
     value : the argument
     call : the call for the message, with braces for the argument: ``check({}, ...)``
+    steps : whether its steps come one after the other, else laws with memory are refused
 
     Raises
     ------
@@ -906,6 +913,8 @@ def check_scene(value: object, call: str) -> None:
         For names of files and for tables the message shows how to make a scene of them.
     """
     if isinstance(value, Scene):
+        if not steps:
+            refuse_memory(value, f"{call.partition('(')[0]} knows no steps, accepted: solve(scene)")
         return
     found, made = say(value), "load('FILE.toml')"
     if isinstance(value, (str, os.PathLike)):
@@ -934,5 +943,6 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_supports,
     _check_moving,
     _check_contacts,
+    check_memory,
     _check_expect,
 )

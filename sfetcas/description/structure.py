@@ -273,6 +273,11 @@ class Member(Record):
         """The branches in which it relaxes where it is flexible; none of others."""
         return sections[str(self.section)].relaxation if self.type == "flexible" else ()
 
+    def remembers(self, sections: Mapping[str, CrossSection]) -> bool:
+        """Whether it is flexible and the law of its section has memory."""
+        law = sections[str(self.section)].law if self.type == "flexible" else None
+        return law is not None and law.remembers
+
     def node_at(self, x: float) -> str | None:
         """The node at an end of a flexible or rigid member, at the fraction 0 or 1 of its length; None within it."""
         return self.nodes[int(x)] if x in (0.0, 1.0) else None

@@ -176,7 +176,7 @@ class Design(Cases):
         accuracy: float | None = None,
         kernels: Kernels = "auto",
     ) -> None:
-        check_scene(scene, "Design({}, ...)")
+        check_scene(scene, "Design({}, ...)", steps=False)
         cases = cases if cases is not None else {ONE: {}}
         self.statement, self._kernels = Formulation(scene, list(cases), accuracy), kernels
         self._guess = dict(guess or {})
@@ -322,7 +322,7 @@ def find(
     SolveError
         There are no such numbers.
     """
-    check_scene(scene, "find({}, ...)")
+    check_scene(scene, "find({}, ...)", steps=False)
     free = (-np.inf, np.inf)
     bounds = unknown if isinstance(unknown, Mapping) else dict.fromkeys(unknown, free)
     design = Design(scene, bounds, guess=guess, accuracy=accuracy)

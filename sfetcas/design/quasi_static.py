@@ -173,7 +173,7 @@ class QuasiStatic(Cases):
         accuracy: float | None = None,
         kernels: Kernels = "auto",
     ) -> None:
-        check_scene(scene, "QuasiStatic({}, ...)")
+        check_scene(scene, "QuasiStatic({}, ...)", steps=False)
         if points < 3:
             raise SceneError(f"found {points}, accepted: three or more", ("points",))
         if not inputs:

@@ -10,7 +10,7 @@ from ..description.scene import Scene
 from ..errors import SceneError
 from ..mechanics.accuracy import gained, halving, remaining
 from ..mechanics.elements import ELEMENTS
-from ..mechanics.mesh import Mesh, first_mesh, uniform_mesh
+from ..mechanics.mesh import Mesh, Remembered, first_mesh, uniform_mesh
 from ..mechanics.model import Model, assemble
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.stability import Stability
@@ -114,7 +114,9 @@ class Meshing:
         self.fixed = {n for n, count in counts.items() if count is not None}
         equal = uniform_mesh(scene, order, {n: count or 1 for n, count in counts.items()})
         cuts = {n: (equal if n in self.fixed else mesh).cuts[n] for n in mesh.cuts}
-        self.target = Mesh(order, cuts, settings.gauss, mesh.rigid, stops=self.stops)
+        # Before the first step nothing is remembered.
+        memory: dict[str, Remembered] | None = {} if scene.remembers else None
+        self.target = Mesh(order, cuts, settings.gauss, mesh.rigid, stops=self.stops, memory=memory)
         # Quaternions lose turns between nodes that are too far apart: the way there is not followed on such a mesh.
         turns = scene.resolved_dimension == "plane" or all(
             len(self.target.cuts[n]) >= len(mesh.cuts[n]) for n in self.fixed
@@ -122,7 +124,8 @@ class Meshing:
         if order >= PILOT_ORDER and turns and (self.target.elements <= PILOT_ELEMENTS or not self.fixed):
             self.pilot_mesh = self.target
         else:
-            self.pilot_mesh = replace(first_mesh(scene, max(order, PILOT_ORDER), turning=1.0), stops=self.stops)
+            pilot = first_mesh(scene, max(order, PILOT_ORDER), turning=1.0)
+            self.pilot_mesh = replace(pilot, stops=self.stops, memory=memory)
 
     @property
     def prescribed(self) -> bool:

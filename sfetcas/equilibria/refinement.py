@@ -31,7 +31,7 @@ from .single import finished, unjudged
 from .solution import Equilibrium, refuse_large
 from .ways import KEPT
 
-__all__ = ["LEVELS", "Refinement"]
+__all__ = ["DRIFT", "LEVELS", "MOST_ELEMENTS", "STALLS", "Refinement"]
 
 HUGE = 2000
 """From this many elements on the error is estimated from the mesh with half the elements, not with twice."""
@@ -312,6 +312,18 @@ class Refinement:
     def _difference(self, coarse: EquilibriumResult, fine: EquilibriumResult) -> tuple[float, float]:
         """How far two answers are apart in what the accuracy is of, and the estimated error of the finer one."""
         return self.meshes.judged(unjudged(coarse.solved), unjudged(fine.solved))
+
+    def answer(self, found: EquilibriumResult, error: float, halved: float | None) -> Equilibrium:
+        """The answer of a step that others remember, with its estimated error and how far it is from a coarser one."""
+        return self._answer(found, error, halved)
+
+    def difference(self, coarse: EquilibriumResult, fine: EquilibriumResult) -> tuple[float, float]:
+        """How far two answers are apart in what the accuracy is of, and the estimated error of the finer one."""
+        return self._difference(coarse, fine)
+
+    def marked(self, found: EquilibriumResult, smooth: float) -> dict[str, Array]:
+        """Elements to halve: those rougher than ``smooth``, of members whose mesh is not prescribed."""
+        return self._marked(found, smooth)
 
     def _marked(self, found: EquilibriumResult, smooth: float) -> dict[str, Array]:
         """Elements to halve: those that are not smooth, of members whose mesh is not prescribed."""

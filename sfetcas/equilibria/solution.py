@@ -307,6 +307,8 @@ class Configuration:
         found: dict[str, Any] = {}
         if self.model.scene.members[name].type != "rigid":
             found["energy"] = self.fields.strain_energy(name)
+        if name in self.fields.dissipated:
+            found["dissipated"] = self.fields.dissipated[name]
         if outlined(self.model.scene, self.model.scene.members[name]):
             largest = self.fields.largest_bending(name)
             found |= zip(("largest_bending_strain", "largest_bending_stress"), largest, strict=True)
@@ -368,10 +370,14 @@ class Equilibrium(Configuration):
 
     @functools.cached_property
     def energy(self) -> dict[str, float]:
-        """``elastic`` energy, potential of the ``loads``, and their ``total``, N m; zero for the undeformed scene."""
+        """``elastic`` energy, potential of the ``loads``, and their ``total``, N m; zero for the undeformed scene.
+
+        Where laws have memory also what they have ``dissipated``, which the total does not have.
+        """
         unit = self.model.scales.moment
         elastic, total = self.strain * unit, self.potential * unit
-        return {"elastic": elastic, "loads": total - elastic, "total": total}
+        lost = {"dissipated": sum(self.fields.dissipated.values())} if self.fields.dissipated else {}
+        return {"elastic": elastic, **lost, "loads": total - elastic, "total": total}
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
         """As :meth:`.Configuration.table`; also for the kinds ``energy`` and ``certificate``."""
@@ -569,7 +575,7 @@ def equilibrium(
         notes=(*notes, *_notes(found.fields)),
         iterations=iterations,
         strain=found.point.strain,
-        potential=found.point.potential,
+        potential=found.point.potential - found.fields.spent / model.scales.moment,
         way=way,
         fields=found.fields,
     )

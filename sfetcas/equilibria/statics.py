@@ -92,6 +92,8 @@ class LoadSteps:
             A load step has no equilibrium that could be found; its ``reached`` has the steps before.
         """
         begin = time.perf_counter()
+        if self.scene.remembers:
+            return self._remembered(begin)
         pilot = self.meshes.prepared(self.meshes.pilot_mesh)
         further, contact = self._further(pilot), self._contact()
         steps: list[Equilibrium] = []
@@ -110,10 +112,24 @@ class LoadSteps:
             except SolveError as error:
                 self.meshes.seconds["solve"] = time.perf_counter() - begin - self.meshes.seconds["model"]
                 raise at_factor(self.ways.named(pilot, error), self.scene, factor, steps, self.meshes.seconds) from None
+        return self._solved(steps, begin)
+
+    def _solved(self, steps: list[Equilibrium], begin: float) -> Solution:
         self.meshes.seconds["solve"] = time.perf_counter() - begin - self.meshes.seconds["model"]
         reached = all((step.certificate.error_estimate or 0.0) <= self.meshes.accuracy for step in steps)
         status = Status.SOLVED if reached or not self.meshes.asked else Status.SHORT
         return Solution(self.scene, status, tuple(steps), self.meshes.seconds)
+
+    def _remembered(self, begin: float) -> Solution:
+        """The load steps where laws have memory."""
+        from .memory_steps import MemorySteps
+
+        sequence = MemorySteps(self.meshes, self.ways, self.refinement)
+        try:
+            return self._solved(sequence.answers(), begin)
+        except SolveError as error:
+            self.meshes.seconds["solve"] = time.perf_counter() - begin - self.meshes.seconds["model"]
+            raise at_factor(error, self.scene, sequence.failed[0], (), self.meshes.seconds) from None
 
     # Most scenes need neither of these: what they import would take longer than a small scene does.
 

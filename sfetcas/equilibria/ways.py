@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ..description.records import counted
 from ..errors import SolveError, Status
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
-from ..solvers.continuation import JUMPED, between, follow, near_factor
+from ..solvers.continuation import CONTRACTION, JUMPED, between, follow, near_factor
 from ..solvers.deflation import nearest
 from ..solvers.prepared import BEYOND, Prepared, Solved
 from ..solvers.redundancy import loose_rows
@@ -113,6 +114,8 @@ class Ways:
     def __init__(self, meshes: Meshing) -> None:
         self.meshes, self.scene = meshes, meshes.scene
         self.started = meshes.scene.started
+        # Where loads turn the stiffness of laws with memory jumps: corrections may grow once, whatever the step.
+        self._contraction = np.inf if meshes.scene.remembers else CONTRACTION
 
     # -- the order ------------------------------------------------------------------------------------
 
@@ -321,6 +324,10 @@ class Ways:
         there = pilot.correct(zero, pilot.model.loading(factor))
         return there.converged and pilot.distance(there.state, zero) < STRAIGHT
 
+    def grown_from(self, pilot: Prepared, begin: float, end: float, state: State) -> EquilibriumResult | None:
+        """The state that the loads lead to from one factor, where ``state`` is an equilibrium, to another."""
+        return self._through(pilot, begin, end, state)
+
     def _through(
         self, pilot: Prepared, begin: float, end: float, state: State, allowed: Allowed | None = None
     ) -> EquilibriumResult | None:
@@ -370,11 +377,12 @@ class Ways:
             if self.meshes.has_superelements:
                 refuse_large(there.fields)
 
-        result = follow(pilot, way, state, switch_branch=switch_branch, allowed=allowed, refuse=refuse)
+        more: dict[str, Any] = {"allowed": allowed, "refuse": refuse, "contraction": self._contraction}
+        result = follow(pilot, way, state, switch_branch=switch_branch, **more)
         passed = not result.reached and switch_branch and not energy_known
         if passed:
             # What cannot be minimised has this one way: better an unstable state that says so than none.
-            result = follow(pilot, way, state, switch_branch=False, allowed=allowed, refuse=refuse)
+            result = follow(pilot, way, state, switch_branch=False, **more)
         if not result.reached:
             return None
         solved = pilot.correct(result.state, way(1.0))

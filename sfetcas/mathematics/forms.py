@@ -12,7 +12,7 @@ import numpy as np
 
 from .arrays import Array, numbers
 
-__all__ = ["BOTH", "Form", "hermite_of", "monotone_slopes"]
+__all__ = ["BOTH", "CONSTANTS", "Form", "hermite_of", "monotone_slopes"]
 
 BOTH = 0
 """Stands for the magnitude of the curvatures about b2 and b3, where 2 and 3 stand for one of them."""
@@ -25,15 +25,19 @@ class Form:
     Attributes
     ----------
     name : str
-        ``bilinear``, ``plateau``, ``ramberg_osgood``, ``table``, ``ribbon``, ``sadowsky`` or ``given``.
+        ``bilinear``, ``plateau``, ``ramberg_osgood``, ``table``, ``ribbon``, ``sadowsky`` or ``given``; with memory
+        ``sliders`` or ``superelastic``, see :mod:`~sfetcas.mathematics.hysteresis`.
     about : int
         Axis of bending: 2, 3 or :data:`BOTH`; of a ribbon the axis about which it is soft; 1 of the strain along.
     count : int
-        Knots of a table, parameters of a given function.
+        Knots of a table, parameters of a given function, fibres of what has memory.
     odd : bool
         Whether a table gives the moments of one sign of the curvature, those of the other one being opposite.
     given : str
         A given potential as CasADi writes a function into a text.
+    spread : bool
+        Whether fibres are spread over the section, so that curvatures about both axes strain each; else what remembers
+        about both axes remembers a vector.
     """
 
     name: str
@@ -41,18 +45,48 @@ class Form:
     count: int = 0
     odd: bool = True
     given: str = ""
+    spread: bool = False
 
     def __str__(self) -> str:
         """A text that may be part of the name of a function."""
         digest = hashlib.sha256(self.given.encode()).hexdigest()[:16] if self.given else ""
-        return f"{self.name}_{self.about}_{self.count}_{'odd' if self.odd else 'any'}{digest}"
+        return (
+            f"{self.name}_{self.about}_{self.count}_{'spread' if self.spread else 'odd' if self.odd else 'any'}{digest}"
+        )
 
     @property
     def size(self) -> int:
-        """How many numbers it has."""
+        """How many numbers it has; the last ones are what it remembers."""
+        if self.remembers:
+            # Those of the material, then weights, places and internal variables of the fibres.
+            return CONSTANTS[self.name] + (1 + self.places) * self.count + self.memory
         return {"bilinear": 1, "plateau": 0, "ramberg_osgood": 2, "table": 3 * self.count, "ribbon": 1}.get(
             self.name, self.count
         )
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it has internal variables."""
+        return self.name in CONSTANTS
+
+    @property
+    def variables(self) -> int:
+        """Internal variables of one fibre: one number, or a vector about both axes."""
+        return 2 if self.about == BOTH and not self.spread else 1
+
+    @property
+    def places(self) -> int:
+        """Numbers that say where a fibre is."""
+        return 2 if self.spread else 1
+
+    @property
+    def memory(self) -> int:
+        """Internal variables in all."""
+        return self.count * self.variables if self.remembers else 0
+
+
+CONSTANTS = {"sliders": 1, "superelastic": 4}
+"""Numbers of the materials with memory: hardening; transformation strain, hardening, energy and resistance."""
 
 
 def monotone_slopes(x: Array, y: Array) -> Array:

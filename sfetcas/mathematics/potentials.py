@@ -24,6 +24,7 @@ import casadi as ca
 
 from .arrays import Array, numbers, values_of
 from .forms import BOTH, Form
+from .hysteresis import energies
 
 __all__ = ["at_rest", "derivatives_of", "deviation", "function_of", "parameters_of", "text_of"]
 
@@ -35,7 +36,12 @@ STEPS = 12
 
 
 def deviation(form: Form, x: ca.SX, p: ca.SX) -> ca.SX:
-    """The deviation of a form from the quadratic potential at curvatures x (3,), with numbers p (size,)."""
+    """The deviation of a form from the quadratic potential at curvatures x (3,), with numbers p (size,).
+
+    With memory that is the sum of what is stored and of what is dissipated since the last step.
+    """
+    if form.remembers:
+        return ca.SX(sum(energies(form, x, p)))
     if form.name == "ribbon":
         return _ribbon(x[0], x[form.about - 1], p[0])
     if form.name == "sadowsky":

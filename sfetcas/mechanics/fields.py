@@ -26,6 +26,7 @@ from .equations import Equations, State, gained_tangents, scaled_strains, turned
 from .laws import curvature_by_moment, law_of, least_stiffness
 from .loading import Loading
 from .magnetism import magnet_terms
+from .memory import dissipated_along
 from .mesh import Touch
 from .relaxation import carried, relax
 from .singles import fibre_strain
@@ -180,7 +181,10 @@ class Fields:
             strain = strain + np.einsum("nji,nj->ni", arms, forces)
         branches = self._branches(member, x)
         strain = strain - branches[0]
-        if section.law is not None:
+        if section.law is not None and section.law.remembers:
+            # Moments are no function of curvatures: those of the elements themselves are told.
+            strain = self._changes(member, x)
+        elif section.law is not None:
             axes = [0, 1, 2] if model.space else [line.bending_axis - 1]
             near = self._changes(member, x)
             strain = curvature_by_moment(model.scene, member, x, strain, near, axes)
@@ -288,6 +292,17 @@ class Fields:
             energies = batch(self.q, self._nodal, self.state.unwrapped, load)[1].ravel()
             np.add.at(found, group.elements if number else np.arange(len(found)), energies)
         return found
+
+    @functools.cached_property
+    def dissipated(self) -> dict[str, float]:
+        """What each member whose law has memory has dissipated since it was undeformed, J."""
+        return dissipated_along(self.model, self.q)
+
+    @property
+    def spent(self) -> float:
+        """What the last step has dissipated, J."""
+        before = (self.model.mesh.memory or {}).values()
+        return sum(self.dissipated.values()) - sum(one.dissipated for one in before)
 
     def magnet(self, name: str) -> dict[str, Any]:
         """What the fields do to a magnet: ``energy`` (N m), ``torque`` (3,) N m and ``force`` (3,) N."""
@@ -628,6 +643,10 @@ class Fields:
         else:
             spin = np.pad(slope, ((0, 0), (2, 0)))
         return np.einsum("nij,ni->nj", quaternion.matrix(line.quaternions(x)), spin)
+
+    def changes(self, member: str, x: Array) -> Array:
+        """Changes (n, 3) of twist and of the curvatures about b2 and b3, 1/m, of the elements at fractions x (n,)."""
+        return self._changes(member, x)
 
     def _frames(self, member: str, x: Array, rotation: Array) -> Array:
         """Section axes as columns, (n, 3, 3)."""

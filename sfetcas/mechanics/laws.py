@@ -23,6 +23,7 @@ from ..description.scene import Scene
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers
 from ..mathematics.forms import Form
+from ..mathematics.hysteresis import energies, updated
 from ..mathematics.potentials import derivatives_of, deviation
 from .elements import Element, element_by_name
 from .parts import Parts
@@ -86,6 +87,36 @@ class AlongElement(Term):
         found[self.axis - 1] = point[1] * bent
         return found
 
+    def stored(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """What is stored: with memory the energy without what a step dissipates."""
+        if not self.form.remembers:
+            return self.energy(q, u, data, load)
+        points, bent = ca.reshape(data, self.width, self.nodes), self._element.changes(q)
+        return sum((self._stored_at(bent[k], points[:, k]) for k in range(self.nodes)), ca.SX(0))
+
+    @property
+    def memory(self) -> int:
+        """Those of the form."""
+        return self.form.memory
+
+    def remembered(self) -> ca.Function:
+        """As :meth:`.Term.remembered`."""
+        sizes = {"q": (self.components, self.nodes), "u": (self.axes, 0), "data": (self.sizes[3], 1)}
+        symbols = [ca.SX.sym(name, *size) for name, size in (sizes | {"load": (0, 1), "lam": (0, 1)}).items()]
+        bent = self._element.changes([ca.vertsplit(symbols[0][:, i]) for i in range(self.nodes)])
+        points = ca.horzsplit(ca.reshape(symbols[2], self.width, self.nodes))
+        variables, spent = [], ca.SX(0)
+        for change, point in zip(bent, points, strict=True):
+            x, own = self.bending(change, point), point[self.width - self.form.size :]
+            variables.append(updated(self.form, x, own))
+            spent += point[0] * energies(self.form, x, own)[1]
+        results = [ca.densify(part) for part in (ca.vertcat(*variables), spent)]
+        return ca.Function(f"remembered_{name_of(self)}", symbols, results, [*ARGUMENTS], ["z", "spent"], {"cse": True})
+
+    def _stored_at(self, bent: ca.SX, point: ca.SX) -> ca.SX:
+        own = point[self.width - self.form.size :]
+        return point[0] * energies(self.form, self.bending(bent, point), own)[0]
+
     def _at(self, bent: ca.SX, point: ca.SX) -> ca.SX:
         own = point[self.width - self.form.size :]
         return point[0] * deviation(self.form, self.bending(bent, point), own)
@@ -100,7 +131,13 @@ class AlongElement(Term):
         energy, by_nodes, hessian = self._element.summed(self._point("both"), q, points)
         gradient, stiffness = self._element.by_rotation_vectors(q, by_nodes, hessian)
         nothing = ca.MX(0, 1), ca.MX(0, 3 * self.nodes)
-        results = [energy, energy, nothing[0], gradient, stiffness, nothing[1]]
+        stored = energy
+        if self.form.remembers:
+            given = [ca.SX.sym(name, size) for name, size in (("here", 4), ("slope", 4), ("data", self.width))]
+            at_point = self._stored_at(self._element.curvature(*given[:2]), given[2])
+            function = ca.Function(f"stored_{name_of(self)}", given, [at_point], {"cse": True})
+            stored = ca.sum2(function.map(self.nodes)(*self._element.at(q), points))
+        results = [energy, stored, nothing[0], gradient, stiffness, nothing[1]]
         names = ["energy", "stored", "rows", "gradient", "stiffness", "rotation_jacobian"]
         return ca.Function(f"rotation_gradient_{name_of(self)}", symbols, results, [*ARGUMENTS], names)
 
@@ -169,6 +206,9 @@ def laws_in(parts: Parts) -> Iterator[One]:
         count, axis = len(cuts[name]) - 1, 0 if element.space else line.bending_axis
         kind = AlongElement(element.space, element.order + 1, element.gauss, axis, law.form)
         values = law.values(section, x.ravel())
+        if law.form.memory and name in (parts.mesh.memory or {}):
+            variables = (parts.mesh.memory or {})[name].variables.reshape(len(values), -1)
+            values = numbers(np.concatenate([values[:, : -law.form.memory], variables], axis=1))
         weight = parts.beams.weight[first : first + count] * scales.length
         length = np.repeat(weight.sum(axis=1), x.shape[1])
         frames = quaternion.matrix(line.quaternions(x.ravel()))

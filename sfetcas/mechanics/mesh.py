@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..description.tendons import kinks_along
 from ..mathematics.arrays import Array, first_of_largest
 from .carried import carried, magnetic, natural_turning
 
-__all__ = ["Cushion", "Mesh", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
+__all__ = ["Cushion", "Mesh", "Remembered", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
 
 
 @dataclass(frozen=True)
@@ -88,6 +88,22 @@ class Cushion:
     edge: float
 
 
+@dataclass(frozen=True, eq=False)
+class Remembered:
+    """What a member whose law has memory remembers of the steps before, on one mesh.
+
+    Attributes
+    ----------
+    variables : ndarray (elements, points, variables)
+        Internal variables at the integration points, dimensionless.
+    dissipated : float
+        What it has dissipated since it was undeformed, J.
+    """
+
+    variables: Array
+    dissipated: float = 0.0
+
+
 @dataclass(frozen=True)
 class Mesh:
     """A mesh: element type, and the elements of each member.
@@ -110,6 +126,9 @@ class Mesh:
         Penalty contacts, in the order of their members and fractions.
     places : bool
         Whether every end of an element of a flexible member has displacement unknowns, as masses need.
+    memory : mapping of str to Remembered, or None
+        What members remember whose laws have memory, nothing before the first step; None where no step is known to
+        come after another.
     """
 
     order: int
@@ -120,6 +139,7 @@ class Mesh:
     stops: tuple[tuple[str, str], ...] = ()
     cushions: tuple[Cushion, ...] = ()
     places: bool = False
+    memory: Mapping[str, Remembered] | None = field(default=None, compare=False, repr=False)
 
     def __repr__(self) -> str:
         cuts = first_lines(self.cuts, lambda name: f"{brief(name)}: {counted(len(self.cuts[name]) - 1, 'element')}")
@@ -131,14 +151,17 @@ class Mesh:
         return sum(len(cuts) - 1 for cuts in self.cuts.values())
 
     def refined(self, marked: Mapping[str, Array] | None = None) -> Mesh:
-        """The mesh with marked elements halved: boolean arrays (elements,) by member; None marks all."""
+        """The mesh with marked elements halved: boolean arrays (elements,) by member; None marks all.
+
+        It remembers nothing: what is remembered belongs to the points of one mesh.
+        """
         cuts = {}
         for name, old in self.cuts.items():
             chosen = np.ones(len(old) - 1, bool) if marked is None else marked[name]
             chosen = chosen & (name not in self.rigid)
             middles = 0.5 * (old[1:] + old[:-1])
             cuts[name] = np.sort(np.concatenate([old, middles[chosen]]))
-        return replace(self, cuts=cuts)
+        return replace(self, cuts=cuts, memory=None if self.memory is None else {})
 
     def same(self, other: Mesh) -> bool:
         """Whether another mesh of the same scene is equal to this one."""

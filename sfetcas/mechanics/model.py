@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from ..description.records import brief, counted, enumerated
+from ..description.remembering import refuse_memory
 from ..description.scene import Scene, check_scene
 from ..description.showing import named, shown
 from ..errors import SceneError
@@ -213,6 +214,7 @@ class Model:
             :func:`sfetcas.solve` finds.
         """
         scene = self.scene
+        refuse_memory(scene, "a model by itself knows no steps, accepted: solve(scene)")
         if scene.contacts and not self.mesh.touches:
             message = "a model by itself knows no contact, accepted: the scene without contacts, or solve(scene)"
             raise SceneError(message, ("contacts",))
@@ -311,6 +313,8 @@ def assemble(
         A moment acts on a node without a rotation of its own.
     """
     check_scene(scene, "assemble({}, ...)")
+    if mesh.memory is None:
+        refuse_memory(scene, "a model by itself knows no steps, accepted: solve(scene)")
     if scene.rotating is not None:
         mesh, assembly = replace(mesh, places=True), "nodal"
     space = scene.resolved_dimension == "space"

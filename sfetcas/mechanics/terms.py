@@ -220,6 +220,17 @@ class Term(Components, abc.ABC):
         """
         raise NotImplementedError
 
+    @property
+    def memory(self) -> int:
+        """Internal variables of each of its points, which the steps before have left; they are the last of its data."""
+        return 0
+
+    def remembered(self) -> ca.Function:
+        """``(q, u, data, load, lam) ->`` internal variables of its points, one point after the other, at the end of a
+        step, and what the step has dissipated; of a kind with :attr:`memory`.
+        """
+        raise NotImplementedError
+
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """Quantities for the answer, in the order of :attr:`answers`, dimensionless; ``lam``: multipliers."""
         return []

@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..description.showing import shown
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
@@ -181,6 +181,7 @@ def equilibrium_solver(
     SceneError
         A scene that cannot be exported, a number or a result that it does not have.
     """
+    check_scene(scene, "export({}, ...)", steps=False)
     refuse_search(scene)
     if scene.analysis.type == "modes":
         message = "found 'modes', accepted: static or path, whose equilibria are exported, or dynamic"

@@ -82,7 +82,7 @@ def fit(
     SolveError
         No equilibrium at the start, no convergence, or parameters that the measurements do not determine.
     """
-    check_scene(scene, "fit({}, ...)")
+    check_scene(scene, "fit({}, ...)", steps=False)
     return fitting(scene, parameters, measurements, settings=settings).fit(start=start)
 
 
@@ -96,7 +96,7 @@ def fitting(
     SceneError
         As :func:`fit`.
     """
-    check_scene(scene, "fitting({}, ...)")
+    check_scene(scene, "fitting({}, ...)", steps=False)
     if not measurements:
         raise SceneError("found none, accepted: one or more", ("measurements",))
     for i, one in enumerate(measurements):

@@ -74,7 +74,7 @@ def parametric(
         A scene with contact, stops or rotating axes; a number or an answer that it does not have; a number that changes
         the structure of the model.
     """
-    check_scene(scene, "parametric({}, ...)")
+    check_scene(scene, "parametric({}, ...)", steps=False)
     parameters = [parameters] if isinstance(parameters, str) else parameters
     answers = [answers] if isinstance(answers, str) else answers
     refuse_search(scene, "without derivatives")

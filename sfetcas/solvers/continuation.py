@@ -20,7 +20,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from .prepared import Prepared, Solved
 
-__all__ = ["JUMPED", "NARROW", "Followed", "advanced", "between", "follow", "near_factor"]
+__all__ = ["CONTRACTION", "JUMPED", "NARROW", "Followed", "advanced", "between", "follow", "near_factor"]
 
 STEP_ROTATION = 0.4
 """A step is too long when its corrections turn a node by more than this, rad."""
@@ -152,6 +152,7 @@ def follow(
     switch_branch: bool = True,
     allowed: Callable[[Solved, Solved], bool] | None = None,
     refuse: Callable[[Solved], None] | None = None,
+    contraction: float = CONTRACTION,
 ) -> Followed:
     """Natural-parameter continuation from ``way(0)``, where ``state`` is an equilibrium, to ``way(1)``.
 
@@ -159,6 +160,8 @@ def follow(
     counted at each point.  With ``switch_branch=False`` a state that becomes unstable is followed on, as far as
     Newton's method carries.  A step that is not ``allowed`` from one equilibrium to the next is too long, and where
     short ones are not either the way ends.  ``refuse`` is shown each, and raises where there is no sense in going on.
+    Corrections shrink by ``contraction`` at least; an infinite one is for stiffnesses that jump at the
+    beginning of any step.
     """
     # What is driven may meet on its way what snaps, and in space a whole turn looks like none.
     whole = way(1.0).plus(way(0.0).scaled(-1.0))
@@ -166,7 +169,7 @@ def follow(
     driven = min(max(turn, float(np.abs(whole.shift).max(initial=0.0)) / TRAVEL, 1.0), FARTHEST)
     longest = 1.0 / max(turn if prepared.model.space else 0.0, driven)
     tries = MOST + int(AROUND * driven) if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL
-    following = _Following(prepared, way, longest, switch_branch, allowed, refuse)
+    following = _Following(prepared, way, longest, switch_branch, allowed, refuse, contraction)
     begin = _On(prepared.correct(state, way(0.0)), 0.0)
     here, reached = advanced(begin, 0.5, following.trial, lambda here: here.done >= 1.0, tries=tries)
     return Followed(here.found.state, reached, tuple(following.left))
@@ -194,6 +197,7 @@ class _Following:
     switch_branch: bool
     allowed: Callable[[Solved, Solved], bool] | None
     refuse: Callable[[Solved], None] | None
+    contraction: float
     left: list[float] = field(default_factory=list)
     crept: int = 0
 
@@ -205,7 +209,7 @@ class _Following:
             here.found.state,
             self.way(trial),
             most=STEP_ROTATION,
-            contraction=CONTRACTION,
+            contraction=self.contraction,
             tangent=here.found.point.entries,
         )
         far = there.first > HALF_TURN and (self.prepared.model.unwrapping.count > 0 or there.second > LINEAR)

@@ -166,7 +166,7 @@ def motion_functions(
     SceneError
         The scene has no such numbers or answers, or a rotation in it has no inertia.
     """
-    check_scene(scene, "motion_functions({}, ...)")
+    check_scene(scene, "motion_functions({}, ...)", steps=False)
     if scene.relaxes:
         message = "motion_functions: found members that relax, whose relaxed strains have no accelerations"
         raise SceneError(f"{message}, accepted: sections without 'relaxation'")

@@ -92,7 +92,7 @@ class OptimalControl(Problem):
         places: Place | None = None,
         settings: Settings | None = None,
     ) -> None:
-        check_scene(scene, "OptimalControl({}, ...)")
+        check_scene(scene, "OptimalControl({}, ...)", steps=False)
         duration = _duration(time)
         known = [variable_of(name, given) for name, given in (variables or {}).items()]
         if not controls and not known:

@@ -220,7 +220,7 @@ def respond(
     SolveError
         A time step does not converge.
     """
-    check_scene(scene, "respond({}, ...)")
+    check_scene(scene, "respond({}, ...)", steps=False)
     for name, history in commands.items():
         if not isinstance(history, History):
             raise SceneError(f"commands: found {history!r} for {name}, accepted: History(t=[...], value=[...])")
