@@ -81,6 +81,7 @@ if TYPE_CHECKING:
     from .description.tendons import Coil as Coil
     from .description.tendons import Tendon as Tendon
     from .description.tendons import Way as Way
+    from .description.tubes import Tube as Tube
     from .design.designing import Design as Design
     from .design.designing import DesignAnswer as DesignAnswer
     from .design.designing import find as find
@@ -166,6 +167,7 @@ _PUBLIC = {
     "description.springs": "Spring",
     "description.stretch_laws": "StretchBilinear StretchPotential StretchTable",
     "description.tendons": "Coil Tendon Way",
+    "description.tubes": "Tube",
     "design.designing": "Design DesignAnswer find",
     "design.quasi_static": "QuasiStatic QuasiStaticAnswer",
     "dynamics.modes": "Modes",

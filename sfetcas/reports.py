@@ -250,6 +250,13 @@ def _report_step(step: Equilibrium, place: str, said: set[str]) -> None:
             f"{key} {_number(state[key], sizes[unit])} {unit}" for key, unit in (("tension", "N"), ("length", "m"))
         )
         print(f"  tendon {name}: {', '.join(texts)}{', slack' if state.get('slack') else ''}")
+    for name in step.model.scene.tubes:
+        state = step.tube(name)
+        texts = (
+            f"{key} {_number(state[key], sizes.get(unit, 1.0))} {unit}"
+            for key, unit in (("torque", "N m"), ("angle", "rad"))
+        )
+        print(f"  tube {name}: {', '.join(texts)}")
     for name in step.model.scene.motions:
         efforts = step.motion(name)
         units = {key: answer_name(f"motions.{name}.{key}").kind.unit for key in efforts}

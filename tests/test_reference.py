@@ -102,6 +102,7 @@ def every_kind():
         "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
     }
     stretching = {"s": {**plane["sections"]["s"], "stretch": True}}
+    tubed = {"s": {**plane["sections"]["s"], "nu": 0.3}}
     force = {"f": {"type": "force", "node": "B", "value": [0, -1]}}
     stopped = {"k": {"node": "A", "stiffness": 2.0, "stop": [-0.1, 0.1]}}
     pulled = {"k": {"type": "translational", "node": "B", "anchor": [1, 1], "stiffness": 1.0}}
@@ -114,6 +115,7 @@ def every_kind():
         {**clamped, "contacts": floor, "loads": force},
         {**clamped, "tendons": {"t": {"way": [{"member": "m", "offset": 0.1}], "pull": 0.01}}},
         {**clamped, "tendons": {"t": {"way": [{"member": "m", "offset": 0.1}], "tension": 0.1, "friction": 0.2}}},
+        {**clamped, "sections": tubed, "tubes": {"t": {"members": "m", "section": "s", "length": 0.5}}, "loads": force},
         {**clamped, "fields": {"B": {"value": [0, 1]}}, "magnets": {"end": {"node": "B", "moment": [1, 0]}}},
     ):
         yield solve(Scene.from_dict(table)).last
@@ -138,5 +140,5 @@ def test_all_that_an_answer_tells_has_a_name_by_which_it_is_found():
     assert met == {kind.name for kind in ANSWERS if "statics" in kind.where} - others
 
 
-LATER = ("springs", "tendons", "motions", "magnets", "contacts")
+LATER = ("springs", "tendons", "tubes", "motions", "magnets", "contacts")
 """Tables of a scene whose names are those of the answer."""

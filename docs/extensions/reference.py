@@ -50,6 +50,7 @@ TABLES = {
     "Tendon": ("Tendons", "`[tendons.NAME]`: tendons that pull and chambers that push"),
     "Way": ("Tendons: way", "`way = [{ ... }, ...]` of a tendon: its parts in their order"),
     "Coil": ("Tendons: helix", "`helix = { ... }` of a part of the way of a tendon"),
+    "Tube": ("Tubes", "`[tubes.NAME]`: tubes that share the centre line of members"),
     "Load": ("Loads", "`[loads.NAME]`"),
     "Motion": ("Motions", "`[motions.NAME]`: prescribed displacements and rotations"),
     "Actuation": ("Actuations", "`[actuations.NAME]`: natural curvature and twist of members"),

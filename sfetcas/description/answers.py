@@ -160,6 +160,9 @@ tendons.NAME.slack | | | statics, motion | of one that does not push, with a len
 tendons.NAME.far_tension | N | | all | of one with friction, at the end that is not pulled
 tendons.NAME.tensions | N | | statics, motion | the same behind each piece of its way, a list from the pulled end on
 tendons.NAME.released | | | statics, motion | of one with friction: whether it is let out instead of pulled
+tubes.NAME.torque | N m | | statics, motion, parameters | about the tangent, of what turns its base on the tube
+tubes.NAME.angle | rad | | all | of its front end against the section there, counting turns
+tubes.NAME.energy | J | | statics, motion, parameters | strain energy of the tube along its members and behind them
 motions.NAME.moment | N m | x y z | statics, motion, parameters | what makes a rotation; a number where that is one
 motions.NAME.force | N | x y z | statics, motion, parameters | what makes a displacement; a number at a driven joint
 magnets.NAME.energy | J | | statics, motion, parameters | minus the moment times the field, summed along members
@@ -169,7 +172,7 @@ contacts.NAME.force | N | x y z | statics | on the member; of a stretch its resu
 contacts.NAME.at | | | statics | fraction of the length, or [from, to]; null where nothing touches
 contacts.NAME.gap | m | | statics | smallest distance
 contacts.NAME.member | | | statics | which it touches; all four are lists where it touches more than once
-energy.elastic | J | | all | of members, springs and tendons
+energy.elastic | J | | all | of members, springs, tendons and tubes
 energy.dissipated | J | | statics, motion | of members whose laws have memory, since they were undeformed
 energy.loads | J | | statics, motion, parameters | from the undeformed scene
 energy.total | J | | statics, motion, parameters | sum of all that there are

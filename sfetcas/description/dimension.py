@@ -17,6 +17,7 @@ from .shapes import CenterLine
 from .springs import Spring
 from .structure import Member, Node
 from .tendons import Tendon, Way, offsets
+from .tubes import Tube
 
 __all__ = ["out_of_plane"]
 
@@ -39,6 +40,7 @@ def out_of_plane(
     fields: Mapping[str, MagneticField],
     magnets: Mapping[str, Magnet],
     tendons: Mapping[str, Tendon],
+    tubes: Mapping[str, Tube],
 ) -> Finding | None:
     """Place in the scene and description of the first thing that does not lie in x-y; None where all does."""
     if gravity is not None and _leaves(gravity):
@@ -59,6 +61,7 @@ def out_of_plane(
         _fields(fields, nodes),
         _magnets(magnets, lines),
         _tendons(tendons, lines),
+        _tubes(tubes),
     )
     return next((finding for group in findings for finding in group), None)
 
@@ -209,6 +212,11 @@ def _tendons(tendons: Mapping[str, Tendon], lines: Mapping[str, CenterLine]) -> 
             winds = way.helix is not None and way.helix.turns != 0.0
             if winds or any(_leaves(arm) for arm in _arms(way, lines)):
                 yield ("tendons", name, "way", str(i)), "leaves x-y"
+
+
+def _tubes(tubes: Mapping[str, Tube]) -> Iterator[Finding]:
+    for name in tubes:
+        yield ("tubes", name), "turns about the tangent"
 
 
 def _arms(way: Way, lines: Mapping[str, CenterLine]) -> Iterator[Triple | Array]:

@@ -36,7 +36,8 @@ from .springs import Spring
 from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
 from .task import Analysis, Expect, Until
-from .tendons import Piece, Tendon, Way, check_pieces, check_way, pieces_of
+from .tendons import Piece, Stretch, Tendon, Way, check_pieces, check_way, pieces_of
+from .tubes import Run, Tube, check_tube, runs_of
 
 __all__ = [
     "Actuation",
@@ -53,6 +54,7 @@ __all__ = [
     "Scene",
     "Spring",
     "Tendon",
+    "Tube",
     "Until",
     "Way",
     "check_loaded",
@@ -90,6 +92,8 @@ class Scene(Record):
         ``[springs.NAME]``: springs, dampers and stops.
     tendons : table by name
         ``[tendons.NAME]``: tendons that pull along their ways, and chambers that push.
+    tubes : table by name
+        ``[tubes.NAME]``: tubes that share the centre line of members, and turn and slide on it.
     loads : table by name
         ``[loads.NAME]``: forces, moments and distributed loads.
     motions : table by name
@@ -137,6 +141,7 @@ class Scene(Record):
     members: Named[Member] = Field(default_factory=dict)
     springs: Named[Spring] = Field(default_factory=dict)
     tendons: Named[Tendon] = Field(default_factory=dict)
+    tubes: Named[Tube] = Field(default_factory=dict)
     loads: Named[Load] = Field(default_factory=dict)
     motions: Named[Motion] = Field(default_factory=dict)
     histories: Named[History] = Field(default_factory=dict)
@@ -249,6 +254,11 @@ class Scene(Record):
         ways = {name: pieces_of(t, self.nodes, self.members, self.center_lines) for name, t in self.tendons.items()}
         return MappingProxyType(ways)
 
+    @cached_property
+    def tube_runs(self) -> Mapping[str, tuple[Run, ...]]:
+        """The parts of members along which each tube lies, by name."""
+        return MappingProxyType({name: runs_of(tube, self.center_lines) for name, tube in self.tubes.items()})
+
     @property
     def started(self) -> bool:
         """Whether nodes have ``start`` places, which choose among equilibria."""
@@ -343,6 +353,7 @@ class Scene(Record):
             self.fields,
             self.magnets,
             self.tendons,
+            self.tubes,
         )
 
     @property
@@ -358,7 +369,7 @@ class Scene(Record):
         return {record.history for _, _, record in self.driven if record.history is not None}
 
 
-DRIVEN = ("loads", "tendons", "motions", "actuations", "fields")
+DRIVEN = ("loads", "tendons", "tubes", "motions", "actuations", "fields")
 """Tables of what grows with the load factor, or with a history."""
 
 _TABLES = {
@@ -367,6 +378,7 @@ _TABLES = {
     "members": ("member",),
     "springs": ("spring",),
     "tendons": ("tendon",),
+    "tubes": ("tube",),
     "loads": ("load",),
     "motions": ("prescribed motion",),
     "histories": ("history", "histories"),
@@ -425,7 +437,7 @@ def check_loaded(scene: Scene) -> None:
     Raises
     ------
     SceneError
-        There are no loads, prescribed motions, tendons, gravity, rotation of the axes or preloaded springs.
+        There are no loads, prescribed motions, tendons, tubes, gravity, rotation of the axes or preloaded springs.
     """
     if scene.analysis.type in ("modes", "dynamic"):
         return
@@ -486,6 +498,35 @@ def _check_tendons(scene: Scene) -> None:
             what = "'all' equilibria" if scene.analysis.type == "static" else f"the analysis {scene.analysis.type!r}"
             message = f"found a length that is given with {what}, in which no tendon becomes slack, accepted: pushes ="
             raise SceneError(f"{message} true, with which it is kept as long, or a stiffness", ("tendons", name))
+
+
+def _check_tubes(scene: Scene) -> None:
+    for name, tube in scene.tubes.items():
+        _known(tube.history, scene.histories, "histories", "tubes", name, "history")
+        try:
+            check_tube(tube, scene.nodes, scene.members, scene.sections, scene.center_lines)
+        except SceneError as error:
+            raise error.within("tubes", name) from None
+        if scene.contacts:
+            raise SceneError("found with contacts, accepted: without tubes", ("contacts",))
+        if scene.rotating is not None:
+            raise SceneError("found with tubes, accepted: without them, in axes that do not turn", ("rotating",))
+        if scene.analysis.type == "dynamic" and scene.analysis.initial == "undeformed":
+            message = "found 'undeformed', where tubes of different curvature are not at rest in each other, accepted:"
+            raise SceneError(f"{message} 'equilibrium'", ("analysis", "initial"))
+        strung = {
+            piece.member for pieces in scene.tendon_pieces.values() for piece in pieces if isinstance(piece, Stretch)
+        }
+        for member in (member for member in tube.members if member in strung):
+            message = f"found the member {member!r}, along which a tendon goes, accepted: tendons through discs"
+            raise SceneError(message, ("tubes", name, "members"))
+        section = scene.sections[tube.section]
+        if scene.analysis.moves and (section.damping or section.drag):
+            message = "found a section with damping or drag, accepted: both at the member alone, for all its tubes"
+            raise SceneError(message, ("tubes", name, "section"))
+        if _massive(scene) and section.missing(["rhoA"]):
+            why = _need_of_mass(scene, f"tubes.{name}", "its mass per length")
+            raise SceneError(f"the key 'rhoA' is missing: {why}", ("sections", tube.section))
 
 
 def _known(word: str | None, table: Iterable[str], kind: str, *where: str) -> None:
@@ -929,6 +970,7 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_members,
     _check_lengths,
     _check_tendons,
+    _check_tubes,
     _check_driven,
     _check_axes,
     _check_dimension,

@@ -63,6 +63,9 @@ class Conserving(Method):
         if model.rotating_frame is not None:
             message = "found with the integrator 'conserving', accepted: radau-3, radau-2, generalised-alpha"
             raise SceneError(message, ("rotating",))
+        for name in model.scene.tubes:
+            message = "found with the integrator 'conserving', which cannot follow a twist without inertia of its own"
+            raise SceneError(f"{message}, accepted: radau-3, radau-2, generalised-alpha", ("tubes", name))
         for member in model.scene.members.values():
             section = str(member.section)
             if member.stretches(model.scene.sections) and model.scene.sections[section].compliance(0.5)[0, 1:].any():

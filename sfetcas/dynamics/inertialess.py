@@ -39,6 +39,9 @@ def check_inertia(equations: Equations, matrix: Array) -> None:
     if equations.model.scene.relaxes:
         message = "found 'idas', but what relaxes in members has no inertia of its own"
         raise SceneError(f"{message}, accepted: {OTHERS}", ("analysis", "integrator"))
+    if equations.model.scene.tubes:
+        message = "found 'idas', but the twist of tubes has no inertia of its own"
+        raise SceneError(f"{message}, accepted: {OTHERS}", ("analysis", "integrator"))
     null = _null(matrix)
     if null is None:
         return

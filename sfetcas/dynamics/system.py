@@ -161,7 +161,7 @@ class System(Expressions):
         grounded = (
             any((group.places < 0).any() for group in self.model.connections) or self.model.rotating_frame is not None
         )
-        # Strains are displacements by their numbers alone.
+        # Strains and angles of tubes are displacements by their numbers alone.
         moving = ~np.isin(positions.Y.row // axes, self.model.segments.without_position)
         free = self.places - len(self.model.segments.strained)
         if grounded or moving.sum() != axes * free:

@@ -200,6 +200,12 @@ class Configuration:
         """State of a tendon: ``tension`` (N), ``length`` (m), and ``slack`` where it may be."""
         return dict(self.fields.tendon(self._known(name, tuple(self.model.scene.tendons), "tendon")))
 
+    def tube(self, name: str) -> dict[str, Any]:
+        """State of a tube: ``torque`` (N m) that turns its base, ``angle`` (rad) of its front end against the section
+        there, and ``energy`` (J).
+        """
+        return dict(self.fields.tube(self._known(name, tuple(self.model.scene.tubes), "tube")))
+
     def motion(self, name: str) -> dict[str, Any]:
         """What enforces a prescribed motion: ``moment`` (N m) or ``force`` (N), see :meth:`.Fields.drive`."""
         return self.fields.drive(self._known(name, tuple(self.model.scene.motions), "motion"))
@@ -269,8 +275,8 @@ class Configuration:
         Parameters
         ----------
         kind : str
-            A table of the answer: ``nodes``, ``reactions``, ``members``, ``springs``, ``tendons``, ``motions``,
-            ``magnets`` or ``contacts``; empty for the quantities of the whole state.
+            A table of the answer: ``nodes``, ``reactions``, ``members``, ``springs``, ``tendons``, ``tubes``,
+            ``motions``, ``magnets`` or ``contacts``; empty for the quantities of the whole state.
         name : str
             Name of the record.  Of a member only integral and largest values; :meth:`along` has its fields.
 
@@ -286,6 +292,7 @@ class Configuration:
             "members": lambda: self._member(name),
             "springs": lambda: dict(self.spring(name).to_dict()),
             "tendons": lambda: self.tendon(name),
+            "tubes": lambda: self.tube(name),
             "motions": lambda: self.motion(name),
             "magnets": lambda: self.magnet(name),
             "contacts": lambda: self.contacts.get(name, {}),
@@ -393,7 +400,9 @@ class Equilibrium(Configuration):
 
     def to_dict(self) -> dict[str, Any]:
         """The equilibrium as an entry of ``steps`` in the JSON answer."""
-        tables = self.tables("nodes", "reactions", "members", "springs", "tendons", "motions", "magnets", "contacts")
+        tables = self.tables(
+            "nodes", "reactions", "members", "springs", "tendons", "tubes", "motions", "magnets", "contacts"
+        )
         for name, found in tables["members"].items():
             places = self.places(name)
             tables["members"][name] = {"s": places, **self.along(name, places), **found}

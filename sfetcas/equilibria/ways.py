@@ -305,11 +305,11 @@ class Ways:
         if pilot.model.minimisable and pilot.diagnosis.mobility and not self.scene.histories:
             # A mechanism has no place of its own without loads: the way begins where a small share of them puts it.
             return self._grown_from_bent(pilot, factor, allowed)
-        if model.loaded_at_zero and factor != 0.0:
+        if model.loaded_at_zero:
             # Then the way leads through the factors, after the loads of factor 0 have grown.
             first = self._followed(pilot, lambda t: model.loading(0.0, t), zero, None, allowed)
-            if first is None:
-                return None
+            if first is None or factor == 0.0:
+                return first
             zero = first.solved.state
         return self._through(pilot, 0.0, factor, zero, allowed)
 

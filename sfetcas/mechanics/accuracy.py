@@ -12,6 +12,7 @@ import numpy as np
 from ..mathematics import interpolation
 from ..mathematics.arrays import Array
 from .fields import Fields
+from .tubes import roughness as twisted
 
 __all__ = ["every_other", "gained", "halving", "largest_difference", "remaining", "roughness"]
 
@@ -88,7 +89,8 @@ def roughness(fields: Fields) -> Array:
     tangents = fields.turned / element.weights[:, None]
     tails = np.einsum("k,eka->ea", interpolation.legendre_tail(element.points), tangents)
     chord = np.linalg.norm(tails, axis=1) * model.scales.length / model.scene.size
-    return np.asarray((2.0 if model.space else 1.0) * angles + chord)
+    found = np.asarray((2.0 if model.space else 1.0) * angles + chord)
+    return found + twisted(model, fields.twisted) if model.scene.tubes else found
 
 
 def every_other(cuts: Array) -> Array:

@@ -153,6 +153,18 @@ class Balance:
         number, i = part_of(self.model, name, piece, element)
         return np.asarray(self._answers(number - 1)[i, 5:])
 
+    def tube(self, name: str) -> dict[str, float]:
+        """Torque, N m, of the base of a tube, angle, rad, of its front end, and energy, J."""
+        found, moment = {"torque": 0.0, "angle": 0.0, "energy": 0.0}, float(self.model.scales.moment)
+        for number, group in enumerate(self.model.connections):
+            if group.kind.table == "tubes" and name in group.names:
+                own = self._answers(number)[[each == name for each in group.names]]
+                found["torque"] += float(own[:, 0].sum()) * moment
+                found["energy"] += float(own[:, -1].sum()) * moment
+                if group.kind.along_element:
+                    found["angle"] = float(own[-1, 1])
+        return found
+
     def rest_length(self, name: str) -> float:
         """Length of a tendon in the undeformed scene, m."""
         groups = [group for group in self.model.connections if group.kind.table == "tendons"]

@@ -81,6 +81,8 @@ def scales_of(scene: Scene) -> Scales:
         elif member.stiffness is not None:
             turning = np.abs(np.diag(np.asarray(member.stiffness)).reshape(-1, 2, 3)[:, 1]).max()
             found.append(float(turning) * scene.center_lines[name].length / length)
+    for tube in scene.tubes.values():
+        found.append(float(np.nanmax(scene.sections[tube.section].stiffness(x))) / length)
     found = found or [spring.stiffness for spring in scene.springs.values() if spring.type == "rotational"]
     found = found or [spring.stiffness * length**2 for spring in scene.springs.values()]
     found = found or [tendon.stiffness * length**2 for tendon in scene.tendons.values() if tendon.stiffness is not None]

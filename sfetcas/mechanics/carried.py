@@ -21,7 +21,7 @@ import numpy as np
 from ..description.loads import Load
 from ..description.scene import Scene
 from ..description.tendons import Piece, Stretch, Tendon, offsets
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import Array, Index, values_of
 from ..mathematics.linear import SparseSolver
 
 __all__ = ["Carried", "carried", "magnetic", "natural_turning"]
@@ -177,13 +177,16 @@ def magnetic(scene: Scene, member: str) -> float:
 
 
 def natural_turning(scene: Scene, member: str) -> float:
-    """Angle, rad, by which actuations at factor 1 bend and twist a free member, at most."""
+    """Angle, rad, by which actuations at factor 1, and tubes, bend and twist a free member, at most."""
     found = 0.0
     for actuation in scene.actuations.values():
         if actuation.member == member:
             low, high = actuation.part
             most = np.linalg.norm(actuation.along(np.linspace(low, high, 9)), axis=1).max()
             found += float(most) * (high - low) * scene.center_lines[member].length
+    for name, runs in scene.tube_runs.items():
+        spans = [(run.end - run.start) * scene.center_lines[member].length for run in runs if run.member == member]
+        found += float(np.linalg.norm(values_of(scene.tubes[name].vector))) * sum(spans)
     return found
 
 

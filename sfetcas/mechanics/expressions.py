@@ -280,8 +280,8 @@ class Expressions(SymbolicTerms):
     def __init__(self, equations: Equations, kernels: Kernels = "auto", calls: float = 1e4) -> None:
         super().__init__(equations.tables, kernels, calls)
         self.equations, model = equations, self.model
-        # Centrifugal forces are a load that no factor multiplies.
-        self.loadings = [*model.groups.values(), *([model.rotating_frame.loading] if model.rotating_frame else [])]
+        # Centrifugal forces and the misfit of tubes are loads that no factor multiplies.
+        self.loadings = [*model.groups.values(), *model.standing]
         self.layout = Layout(
             components=model.element.components,
             rotations=self.rotations,

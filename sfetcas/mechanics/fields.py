@@ -35,6 +35,7 @@ from .stretch_laws import least_tangent, strain_by_force, stretch_law_of
 from .tendon_friction import settle, turned_since
 from .tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
 from .terms import answers_of, energies_of
+from .tubes import angles_like, moments_of
 
 __all__ = ["Fields", "rotations_along", "strained_like", "transferred"]
 
@@ -181,7 +182,10 @@ class Fields:
             strain = strain + np.einsum("nji,nj->ni", arms, forces)
         branches = self._branches(member, x)
         strain = strain - branches[0]
-        if section.law is not None and section.law.remembers:
+        tubed = any(run.member == member for runs in model.scene.tube_runs.values() for run in runs)
+        if tubed:
+            strain = self._shared_with_tubes(member, x, strain)
+        elif section.law is not None and section.law.remembers:
             # Moments are no function of curvatures: those of the elements themselves are told.
             strain = self._changes(member, x)
         elif section.law is not None:
@@ -225,6 +229,30 @@ class Fields:
         moment, strain = (np.einsum("np,npa->na", at.at_points, part[at.elements]) for part in found)
         back = quaternion.conjugate(model.scene.center_lines[member].quaternions(x))
         return quaternion.rotate(back, moment) * model.scales.moment, strain
+
+    def _shared_with_tubes(self, member: str, x: Array, moment: Array) -> Array:
+        """Strains (n, 3), 1/m, about the section axes of a member that carries moments (n, 3), N m, with its tubes."""
+        scene = self.model.scene
+        more, offset = moments_of(self.model, member, x, self.twisted, self._bases)
+        natural = scene.center_lines[member].curvatures(x) + self.natural(member, x)
+        own = scene.sections[str(scene.members[member].section)].stiffness_matrix(x)
+        missing = moment - offset - np.einsum("nij,nj->ni", more, natural)
+        return np.asarray(np.linalg.solve(own + more, missing[..., None])[..., 0])
+
+    @functools.cached_property
+    def _bases(self) -> dict[str, float]:
+        """Angles of the bases of tubes, rad."""
+        found = dict[str, float]()
+        for group, load in zip(self.model.connections, self._loading.loads, strict=True):
+            if group.kind.table == "tubes" and group.kind.along_element:
+                found |= dict(zip(group.names, load[:, 0].tolist(), strict=True))
+        return found
+
+    def tube(self, name: str) -> dict[str, float]:
+        """``torque`` (N m) that turns the base of a tube, ``angle`` (rad) of its front end against the section, and
+        strain ``energy`` (J).
+        """
+        return self.balance.tube(name)
 
     def section_forces(self, member: str, x: Array) -> Array:
         """Section forces (n, 3), N, along b1, b2, b3 at fractions x (n,) of a flexible or rigid member's length."""
@@ -465,6 +493,11 @@ class Fields:
             begin = float(start["force"][0] @ self._tangent_at(touch.member, touch.at))
         bent = self._curvature(touch) * (pressed - self.pressed_moments(touch, np.array([touch.at]))[0][0])
         return np.asarray(begin - bent * model.scales.length - gained)
+
+    @property
+    def twisted(self) -> Array:
+        """Angles (places,), rad, by which tubes are twisted, at their places."""
+        return self._nodal[:, 0]
 
     @property
     def largest_load(self) -> float:
@@ -902,10 +935,11 @@ def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:
 
 
 def strained_like(target: Any, y: Array, source: Any, values: Array) -> None:
-    """Set the strains among the displacement unknowns ``y`` of one model to those of another, in place.
+    """Set the strains, and angles of tubes, among the unknowns ``y`` of one model to those of another, in place.
 
     ``values`` are the displacement unknowns of the other model, of the same members on another mesh.
     """
+    angles_like(target, y, source, values)
     if not (target.element.strains and source.element.strains):
         return
     for name, member in target.scene.members.items():

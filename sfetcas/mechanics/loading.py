@@ -14,6 +14,7 @@ import numpy as np
 
 from ..description.scene import Load, Motion, Scene
 from ..description.sections import evaluate
+from ..description.tubes import mass_of_tubes
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers, plus, unit, values_of
 from ..mathematics.interpolation import pieces
@@ -291,7 +292,7 @@ class _Writer:
         if section is None:
             return
         x = self.places(member)
-        mass = self.scene.sections[section].mass(x.ravel()).reshape(x.shape)
+        mass = self.scene.sections[section].mass(x.ravel()).reshape(x.shape) + mass_of_tubes(self.scene, member, x)
         line = self.scene.center_lines[member]
         if self.scene.members[member].type == "rigid" and line.turning > 0.0:
             self._add_weight_of_chord(group, member)
@@ -371,7 +372,7 @@ class _Writer:
 
     def _add_drive(self, group: _Sums, name: str, motion: Motion) -> None:
         """Angle or travel of a driven joint."""
-        for i, number, kind in self.terms(name, lambda kind: bool(kind.drives)):
+        for i, number, kind in self.terms(name, lambda kind: bool(kind.drives) and kind.table == "motions"):
             if kind.drives == "angle":
                 group.load(i, number, motion.rotation)
             else:

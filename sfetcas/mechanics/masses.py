@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..description.shapes import Straight, place
+from ..description.tubes import mass_of_tubes
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
@@ -194,7 +195,7 @@ class _Weigher:
         part, cuts, line = model.elements_of(name), model.mesh.cuts[name], self.scene.center_lines[name]
         x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.nodes
         weights = line.length * np.diff(cuts)[:, None] * element.weights
-        mass = section.mass(x.ravel()).reshape(x.shape) * weights
+        mass = (section.mass(x.ravel()).reshape(x.shape) + mass_of_tubes(self.scene, name, x)) * weights
         drag = section.drag * weights
         self.total += float(mass.sum())
         mass, drag = self._off_line(name, x, mass, drag)

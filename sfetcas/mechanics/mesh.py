@@ -15,6 +15,7 @@ from ..description.sections import FINE
 from ..description.sections import breaks as kinks
 from ..description.showing import first_lines, shown
 from ..description.tendons import kinks_along
+from ..description.tubes import tube_breaks
 from ..mathematics.arrays import Array, first_of_largest
 from .carried import carried, magnetic, natural_turning
 
@@ -190,6 +191,10 @@ def breaks_of(scene: Scene, member: str) -> Array:
         places += kinks(part, scene.center_lines[member].length)
     for tendon in scene.tendons.values():
         places += kinks_along(tendon, member)
+    for name, runs in scene.tube_runs.items():
+        for run in runs:
+            if run.member == member:
+                places += tube_breaks(scene.tubes[name], run, scene.center_lines[member])
     places = sorted(places)
     keep = [a for a, b in zip(places, places[1:], strict=False) if b - a > tolerances.DECIMAL]
     return np.array([*keep, 1.0])

@@ -41,7 +41,8 @@ from .segments import Segments, cut_members
 from .stretch_laws import stretch_laws_in
 from .tendon_friction import rubbing_in
 from .tendon_terms import tendons_in
-from .terms import Group, One, grouped
+from .terms import ALWAYS, Group, One, grouped
+from .tubes import tubes_in
 from .unwrapping import Unwrapping, unwrapping_of
 
 __all__ = ["SOURCES", "Block", "Model", "assemble"]
@@ -59,6 +60,7 @@ SOURCES: list[Callable[[Parts], Iterable[One]]] = [
     center_weights_in,
     tendons_in,
     rubbing_in,
+    tubes_in,
 ]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
 
@@ -92,6 +94,8 @@ class Model:
         Terms of joints, springs, small members, loads and tendons.
     groups : mapping
         Loadings at factor 1, by the name of their history; None: multiplied by the load factor.
+    constant : Loading or None
+        What no factor multiplies, as the misfit of tubes.
     rotating_frame : RotatingFrame or None
         Centrifugal terms in rotating axes.
     """
@@ -107,6 +111,7 @@ class Model:
     positions: Positions
     connections: tuple[Group, ...]
     groups: Mapping[str | None, Loading]
+    constant: Loading | None = None
     rotating_frame: RotatingFrame | None = None
 
     @property
@@ -196,7 +201,13 @@ class Model:
     @property
     def loaded_at_zero(self) -> bool:
         """Whether there may be loads at factor 0: from histories, or in rotating axes."""
-        return bool(self.scene.histories) or self.rotating_frame is not None
+        return bool(self.scene.histories) or bool(self.standing)
+
+    @property
+    def standing(self) -> list[Loading]:
+        """Loadings that are there at every factor."""
+        turning = None if self.rotating_frame is None else self.rotating_frame.loading
+        return [loading for loading in (self.constant, turning) if loading is not None]
 
     @functools.cached_property
     def minimisable(self) -> bool:
@@ -263,8 +274,7 @@ class Model:
         """Loads and prescribed motions at a load factor, multiplied by ``share``; dimensionless."""
         parts = [self.groups[name].scaled(share * value) for name, value in self.factors(factor).items()]
         total = parts[0]
-        if self.rotating_frame is not None:
-            parts.append(self.rotating_frame.loading.scaled(share))
+        parts += [loading.scaled(share) for loading in self.standing]
         for part in parts[1:]:
             total = total.plus(part)
         return total
@@ -334,6 +344,7 @@ def assemble(
         positions = both[assembly]
     parts = Parts(scene, mesh, element, scales, beams, segments, rotations)
     connections = grouped(one for source in SOURCES for one in source(parts))
+    groups = unit_loadings(parts, connections)
     model = Model(
         scene=scene,
         mesh=mesh,
@@ -345,7 +356,8 @@ def assemble(
         rotations=rotations,
         positions=positions,
         connections=connections,
-        groups=unit_loadings(parts, connections),
+        constant=groups.pop(ALWAYS, None),
+        groups=groups,
     )
     return model if scene.rotating is None else with_rotating_frame(model)
 
@@ -362,8 +374,9 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         blocks.append(Block("norms", free + about, "a quaternion of a free rotation is unit; held ones need no row"))
     else:
         blocks.append(Block("angles", free, f"1 for each of {counted(free, 'free rotation')}: {model.reason}"))
+    angles = sum(int(np.unique(part[part >= 0]).size) for part in model.segments.angles.values())
     relaxing = {model.segments.places[i] for i in model.segments.relaxing.flat if i >= 0}
-    strains = sum(len(part) for name, part in model.segments.strained.items() if name not in relaxing)
+    strains = sum(len(part) for name, part in model.segments.strained.items() if name not in relaxing) - angles
     if strains:
         blocks.append(
             Block("strains", strains, "stretch and shear at the integration points of members that have them")
@@ -372,11 +385,13 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         count = sum(len(model.segments.strained[name]) for name in relaxing)
         blocks.append(Block("relaxed strains", count, "at the integration points, for each branch of what relaxes"))
         strains += count
-    if len(model.positions.unknowns) > strains:
+    if angles:
+        blocks.append(Block("angles of tubes", angles, "how each tube is twisted against the member at its nodes"))
+    if len(model.positions.unknowns) > strains + angles:
         why = "nodal assembly" if model.assembly == "nodal" else "nothing but guides hold the structure"
         if model.assembly != "nodal" and model.segments.retained:
             why = "springs, tendons, small members, slides or followers act upon places"
-        count = len(model.positions.unknowns) - strains
+        count = len(model.positions.unknowns) - strains - angles
         blocks.append(Block("displacements", count, f"{why}: positions are unknowns"))
     if model.positions.rows:
         why = "one for each member" if model.assembly == "nodal" else "one for each loop and further held direction"

@@ -20,8 +20,19 @@ from ..mathematics import interpolation
 from ..mathematics.arrays import Array, Index
 from .mesh import Mesh
 from .rotations import end_joints
+from .terms import GROUND
 
-__all__ = ["MOST_COUPLED", "Segment", "Segments", "cushioned", "cut_members", "elongation_of", "spanned", "tensions_of"]
+__all__ = [
+    "MOST_COUPLED",
+    "Segment",
+    "Segments",
+    "angle_of",
+    "cushioned",
+    "cut_members",
+    "elongation_of",
+    "spanned",
+    "tensions_of",
+]
 
 MOST_COUPLED = 20
 """Rotations and strains at most that the length between two holes of a tendon couples: of more, places of the holes are
@@ -62,6 +73,9 @@ class Segments:
         The same of the part of the changes of curvature (0) and of the strains (1) that has relaxed in each branch.
     strained : mapping of str to mapping of int to str
         Components that are unknown at each of these places, which are the last ones, with their names.
+    angles : mapping of str to ndarray (elements, nodes)
+        For each tube, and each element along which it lies, numbers of the places whose first components are the angles
+        by which it is twisted against the section at the nodes, since its base; of a base that is held the ground.
     """
 
     places: tuple[str, ...]
@@ -72,6 +86,7 @@ class Segments:
     strains: Index
     relaxing: Index
     strained: Mapping[str, Mapping[int, str]]
+    angles: Mapping[str, Index]
 
     def alike(self, other: Segments) -> bool:
         """Whether other segments of the same scene join the same places by as many elements."""
@@ -124,6 +139,11 @@ def cushioned(member: str, at: float) -> str:
 def elongation_of(tendon: str) -> str:
     """Name of the place whose displacement is the elongation of an elastic tendon."""
     return f"elongation of tendons.{tendon}"
+
+
+def angle_of(tube: str, number: int) -> str:
+    """Name of the place that holds the angle of a tube at a node, counted from 0 at its base."""
+    return f"tubes.{tube}, node {number + 1}"
 
 
 def tensions_of(scene: Scene, mesh: Mesh, tendon: str) -> tuple[str, ...]:
@@ -264,6 +284,8 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     owner = np.repeat(np.arange(len(parts)), sizes)
     strains, strained = _strained(scene, mesh, len(places), len(owner))
     relaxing = _relaxing(scene, mesh, len(places), len(owner), strained)
+    angles, twisted = _angles(scene, mesh, len(places) + len(strained))
+    strained |= twisted
     return Segments(
         (*places, *strained),
         frozenset(retained | set(strained)),
@@ -273,7 +295,21 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
         strains,
         relaxing,
         strained,
+        angles,
     )
+
+
+def _angles(scene: Scene, mesh: Mesh, first: int) -> tuple[dict[str, Index], dict[str, Mapping[int, str]]]:
+    """:attr:`Segments.angles`, and the places with their one component; places are numbered from ``first``."""
+    found, places = dict[str, Index](), dict[str, Mapping[int, str]]()
+    for name, runs in scene.tube_runs.items():
+        spans = ([mesh.cut_at(run.member, end) for end in (run.start, run.end)] for run in runs)
+        count = sum(b - a for a, b in spans)
+        numbers = mesh.order * np.arange(count)[:, None] + np.arange(mesh.order + 1)
+        held = scene.tubes[name].start >= 0.0
+        found[name] = np.where(held & (numbers == 0), GROUND, first + len(places) + numbers - held)
+        places |= {angle_of(name, i): {0: "angle"} for i in range(int(held), mesh.order * count + 1)}
+    return found, places
 
 
 STRAINS = ("along", "across", "across b3")

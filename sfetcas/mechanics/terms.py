@@ -28,6 +28,7 @@ from ..mathematics.arrays import Array, Index, numbers
 from ..mathematics.quaternion import Components, product, turned
 
 __all__ = [
+    "ALWAYS",
     "ARGUMENTS",
     "GROUND",
     "Discrete",
@@ -53,6 +54,9 @@ Side = list[ca.SX]
 
 Discrete = Literal["middle", "ends", "relative", "strains"]
 """Where derivatives are taken between two states in the energy-momentum scheme, see :attr:`Term.discrete`."""
+
+ALWAYS = "\0"
+"""In the place of the name of a history, none of which is called so: what no factor multiplies."""
 
 GROUND = -1
 """Number of a side that is the ground, which neither rotates nor moves."""
@@ -95,7 +99,7 @@ class Term(Components, abc.ABC):
     """Whether it is a dead moment."""
 
     drives: ClassVar[str] = ""
-    """What a prescribed motion gives by its ``load``: ``angle`` or ``travel``; empty where it is no driven joint."""
+    """What is prescribed by its ``load``: ``angle`` or ``travel`` of a joint, ``twist`` of a tube; else empty."""
 
     along_element: ClassVar[bool] = False
     """Whether it acts along an element, whose rotations are its sides, so that its moments are among those of the
@@ -304,7 +308,8 @@ class One:
     row : str
         Name of its rows.
     loads : mapping of str or None to ndarray (loads,)
-        Data that grow with a history, or with the load factor (None), at factor 1, beside the loads of the scene.
+        Data that grow with a history, with the load factor (None), or not at all (:data:`ALWAYS`), at factor 1, beside
+        the loads of the scene.
     element : int
         Number of the element whose rotations are its sides, or of the first of them; -1 where there is none.
     """

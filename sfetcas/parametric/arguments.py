@@ -26,8 +26,10 @@ from ..mathematics.piecewise import piecewise
 from ..mechanics.beams import ELEMENT_DATA
 from ..mechanics.equations import Equations
 from ..mechanics.expressions import LOADS, Expressions
+from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh, breaks_of
 from ..mechanics.model import Model, assemble
+from ..mechanics.terms import ALWAYS
 from ..solvers.program import Program, data_of, is_data
 from .results import Results
 
@@ -164,6 +166,7 @@ def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
 
 MESHED = (
     r"members\.[^.]+\.elements|(actuations|magnets)\.[^.]+\.(from|to)|tendons\.[^.]+\.way\.\d+\.(from|to|discs(\.\d+)?)"
+    r"|tubes\.[^.]+\.(start|length|curved_from)"
 )
 """Names of numbers at which elements end."""
 
@@ -231,6 +234,7 @@ def default_arguments(scene: Scene) -> list[str]:
     for name, tendon in scene.tendons.items():
         pulls = ("tension", "pressure", "pull", "length")
         names += [f"tendons.{name}.{key}" for key in pulls if getattr(tendon, key) is not None]
+    names += [f"tubes.{name}.{key}" for name in scene.tubes for key in ("angle", "rotation")]
     names += [f"actuations.{name}.value" for name in scene.actuations]
     for name, source in scene.fields.items():
         names += [f"fields.{name}.{key}" for key in ("value", "moment") if getattr(source, key) is not None]
@@ -391,6 +395,7 @@ VALUED = ("loads", "actuations", "fields")
 UNITS = {
     "displacement": "m",
     "rotation": "rad",
+    "angle": "rad",
     "position": "m",
     "gravity": "m/s2",
     "rhoA": "kg/m",
@@ -430,6 +435,8 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
     if path[0] == "springs" and len(path) > 2:
         turning = scene.springs[path[1]].type == "rotational"
         return {"stiffness": "N m" if turning else "N/m", "rest": "rad" if turning else "m"}.get(key, "m")
+    if path[0] == "tubes" and key == "curvature":
+        return "1/m"
     if path[0] == "tendons" and key == "stiffness":
         return "N/m"
     if path[0] == "sections":
@@ -450,7 +457,7 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
 
 def _meaning(path: Sequence[str]) -> str:
     kinds = {"loads": "load", "motions": "motion", "sections": "section", "nodes": "node", "springs": "spring"}
-    kinds |= {"tendons": "tendon", "actuations": "actuation", "fields": "field", "magnets": "magnet"}
+    kinds |= {"tendons": "tendon", "tubes": "tube", "actuations": "actuation", "fields": "field", "magnets": "magnet"}
     if len(path) < 2:
         return path[0]
     return f"{'.'.join(path[2:])} of the {kinds.get(path[0], path[0])} {path[1]}"
@@ -495,13 +502,15 @@ class Arguments:
         self.model = _at_values(symbolic)
         self.expressions = Expressions(Equations(self.model, kernels="interpreted"), "interpreted")
         everything = Program(self.expressions, self._every())
-        self._layout, self._groups = everything.sizes, list(self.model.groups)
+        self._layout, self._groups = everything.sizes, list(_loadings(self.model))
         undeformed, data = Active.of(results.rest(symbolic)), self._data(symbolic, everything)
         self._undeformed, self._given = (
             _Part(part, self._symbols, name) for part, name in ((undeformed, "rest"), (data, "data"))
         )
-        used = {name: symbolic.scene.histories[name] for name in self._groups if name is not None}
-        self._courses = {name: _Part(_course(one), self._symbols, "course") for name, one in used.items()}
+        used = {name: symbolic.scene.histories[name] for name in self._groups if name not in (None, ALWAYS)}
+        self._courses: dict[str | None, _Part] = {
+            name: _Part(_course(one), self._symbols, "course") for name, one in used.items()
+        }
         self._check(symbolic)
         self.program = Program(self.expressions, self._varying(), prefix=prefix)
 
@@ -588,7 +597,7 @@ class Arguments:
     def _data(self, model: Model, everything: Program) -> Active:
         """Data of a model, then its loads group by group, flat."""
         first = everything.slice_of_loads.start
-        loads = [everything.given_of(model.groups[name])[first:] for name in self._groups]
+        loads = [everything.given_of(loading)[first:] for loading in _loadings(model).values()]
         return gathered([*data_of(model).values(), *loads])
 
     def _split(self, flat: Any, cut: Callable[[Any, list[int]], Any]) -> tuple[list[Any], list[list[Any]]]:
@@ -633,6 +642,8 @@ class Arguments:
         return ca.vertcat(ca.MX(0, 1), *(found[name] for name in self.program.sizes))
 
     def _factor(self, p: ca.MX, group: str | None) -> ca.MX | float:
+        if group == ALWAYS:
+            return 1.0
         name = FACTOR if group is None else f"histories.{group}"
         if name in self._names:
             return p[self._names.index(name)]
@@ -652,6 +663,11 @@ class Arguments:
         """A function (arguments) -> given, with a name."""
         p = ca.MX.sym("arguments", len(self.defaults))
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
+
+
+def _loadings(model: Model) -> dict[str | None, Loading]:
+    """Loadings of a model by the names of their histories, with that which is there at every factor."""
+    return {**model.groups, **({} if model.constant is None else {ALWAYS: model.constant})}
 
 
 def _course(history: History) -> Active:

@@ -92,6 +92,7 @@ def default_results(model: Model, *, unique: bool = True) -> list[str]:
         names += [f"springs.{name}.{field}" for field in pair]
     for name, tendon in model.scene.tendons.items():
         names += [f"tendons.{name}.{field}" for field in ("tension", "length", *["far_tension"] * tendon.rubs)]
+    names += [f"tubes.{name}.{field}" for name in model.scene.tubes for field in ("torque", "angle")]
     return [*names, "energy.elastic", "energy.potential"]
 
 
@@ -113,6 +114,7 @@ WHOSE = {
     "members": "of the member",
     "springs": "of the spring",
     "tendons": "of the tendon",
+    "tubes": "of the tube",
     "motions": "of the motion",
     "magnets": "of the magnet",
     "energy": "energy",
@@ -205,6 +207,10 @@ class Results:
                 raise SceneError(unknown(node, flexible, "flexible members"))
             if name.at is not None and not 0.0 <= name.at <= 1.0:
                 raise SceneError(f"found {name.at:g}, accepted: fractions of the length, from 0 to 1")
+            tubed = any(run.member == node for runs in scene.tube_runs.values() for run in runs)
+            if tubed and kind.key in BY_FORCES[2:]:
+                message = f"found the {kind.key.replace('_', ' ')} along a member with tubes, accepted: its position,"
+                raise SceneError(f"{message} rotation, force and moment, or answers of solve(scene)")
         turns = kind.table == "nodes" and kind.key in ("quaternion", "angle")
         if (turns or not kind.key) and node in scene.nodes and self.model.rotations.node_turn[node] is None:
             raise SceneError("found a node that has no rotation of its own")
@@ -368,6 +374,8 @@ class _Outputs:
             return self._magnet(record, key)
         if kind.table == "tendons":
             return self._tendon(record, key)
+        if kind.table == "tubes":
+            return self._tube(record, key)
         tables = {"nodes": self._node, "reactions": self._reaction, "members": self._member, "motions": self._motion}
         return tables[kind.table](record, key)
 
@@ -675,6 +683,15 @@ class _Outputs:
             own = [i for i, each in enumerate(group.names) if each == name and told]
             found += [self._told(number, i, key) for i in own[: None if key == "length" else 1]]
         return sum(found[1:], found[0]) if key == "length" else found[0]
+
+    def _tube(self, name: str, key: str) -> ca.MX:
+        """Angle at the front end, or torque or energy as the sum over the parts."""
+        found = []
+        for number, group in enumerate(self._model.terms):
+            own = [i for i, each in enumerate(group.names) if each == name and group.kind.table == "tubes"]
+            last = own[-1:] if group.kind.along_element else []
+            found += [self._told(number, i, key) for i in (last if key == "angle" else own)]
+        return sum(found[1:], found[0])
 
     # -- stiffness ----------------------------------------------------------------------------------
 

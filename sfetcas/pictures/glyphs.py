@@ -22,6 +22,7 @@ from ..description.springs import Spring
 from ..description.structure import SLIDING, Member, Node, unit
 from ..description.supports import turned_about
 from ..description.tendons import Hole, Stretch, Tendon, tangent
+from ..description.tubes import Tube
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from .limits import across, sketch_obstacle, sketch_slots, sketch_stops, turned_party
@@ -49,6 +50,7 @@ ARROW = 0.12
 SYMBOL = 0.03
 SPRING = "#5A5A5A"
 TENDON = "#8C4A9E"
+TUBE = "#B4BAC3"
 SPIRAL = 0.026
 """Outer radius of the spiral of a rotational spring."""
 SHORT = 0.03
@@ -307,6 +309,17 @@ def _sketch_tendon(sketch: Sketch, name: str, tendon: Tendon) -> None:
                 sketch.line(arm, f"hole-{name}", colour=SPRING, width=0.7, level=4.5)
 
 
+# Tubes
+
+
+def _sketch_tube(sketch: Sketch, name: str, tube: Tube) -> None:
+    """A wide band below its members, the wider the shorter it is, so that each is seen."""
+    longer = sum(other.start + other.length > tube.start + tube.length for other in sketch.scene.tubes.values())
+    for run in sketch.scene.tube_runs[name]:
+        line = sketch.along(run.member, np.linspace(run.start, run.end, 97))
+        sketch.line(line, f"tube-{name}", colour=TUBE, width=9.0 + 3.0 * longer, level=1.5 - 0.1 * longer)
+
+
 def _arm(sketch: Sketch, hole: Hole) -> Array:
     """What a hole is fixed to, and where it is in the picture, (2, 3)."""
     x, turned = np.array([hole.at]), None
@@ -543,6 +556,7 @@ SUPPORTS: tuple[tuple[str, Glyph], ...] = (
     ("members", sketch_slots),
     ("springs", _sketch_spring),
     ("tendons", _sketch_tendon),
+    ("tubes", _sketch_tube),
 )
 """Glyphs of what holds a structure, by the tables of the scene: all that a new kind of record needs for a picture."""
 
