@@ -108,6 +108,7 @@ ORDER = [
     "mechanics.unwrapping",
     "mechanics.observed",
     "mechanics.body_points",
+    "mechanics.mass_centers",
     "mechanics.masses",
     "mechanics.rotating_frame",
     "mechanics.model",

@@ -365,7 +365,7 @@ class CrossSection(Record):
         b2, of twist with bending about b3, and of bending about b2 with bending about b3.  The moment about b1 is
         ``GJ`` times the change of the twist plus the first entry times that of the curvature about b2 plus the
         second times that about b3, and so on.  Needs all three stiffnesses.  Default: zero.
-    stiffness : (6, 6), N, N m, N m²
+    stiffness_ : (6, 6), N, N m, N m²
         Instead of ``EI2``, ``EI3``, ``GJ``, ``EA``, ``GA2`` and ``GA3``: all forces and moments by all strains of the
         section, symmetric and positive definite.  Rows are the axial force, the shear forces along b2 and b3, and the
         moments about b1, b2, b3; columns are stretch, shear along b2 and b3, twist, and the changes of the curvatures

@@ -39,6 +39,7 @@ __all__ = [
     "scaled_strains",
     "turned_points",
     "turned_tangents",
+    "yielded",
 ]
 
 UNLOADED = 1e-6

@@ -176,7 +176,8 @@ class Fields:
         if record.type == "rigid":
             return {**result, "curvature": line.curvatures(x)}
         section = model.scene.sections[str(record.section)]
-        forces = np.einsum("nij,ni->nj", frames, result["force"])
+        yields = section.stretches or section.shifted
+        forces = np.einsum("nij,ni->nj", frames, result["force"]) if yields else result["force"]
         if section.shifted:
             arms = section.arms(x)
             strain = strain + np.einsum("nji,nj->ni", arms, forces)
@@ -199,7 +200,7 @@ class Fields:
             with np.errstate(invalid="ignore"):
                 strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
         result["curvature"] = line.curvatures(x) + self.natural(member, x) + strain
-        if record.stretches(model.scene.sections) or section.shifted:
+        if yields:
             result["strain"] = np.einsum("nij,nj->ni", section.compliance_of_forces(x), forces) - branches[1]
             if section.stretch_law is not None:
                 near = self._strains_along(member, x)

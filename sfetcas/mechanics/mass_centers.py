@@ -15,7 +15,7 @@ What acts at the centre is on the line the same force, and a couple along the el
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, final
 
@@ -161,7 +161,7 @@ def center_weights_in(parts: Parts) -> Iterator[One]:
             yield One(kind, f"element {first + e}", "", data, turns, loads={None: gravity}, element=first + e)
 
 
-def along_elements(model: Any, q: Array, loading: Loading, shares: Iterable[tuple[Index, Array, Array]]) -> Loading:
+def along_elements(model: Any, q: Array, loading: Loading, shares: Sequence[tuple[Index, Array, Array]]) -> Loading:
     """The loads with forces at the ends of arms along elements added, dimensionless.
 
     Parameters
@@ -170,14 +170,14 @@ def along_elements(model: Any, q: Array, loading: Loading, shares: Iterable[tupl
     loading : Loading
     shares : of numbers (n,) of elements, arms (n, nodes, axes) and forces (n, nodes, axes)
     """
+    if not shares:
+        return loading
     spread, torque = np.zeros_like(loading.spread), loading.torque.copy()
     for elements, arms, forces in shares:
         a = quaternion.turned_by(q[model.rotations.turns[elements]], arms)
         in_plane = (a[..., 0] * forces[..., 1] - a[..., 1] * forces[..., 0])[..., None]
         np.add.at(spread, elements, forces)
         np.add.at(torque, elements, np.cross(a, forces) if model.space else in_plane)
-    if not spread.any():
-        return loading
     pull, on_places = carried(spread, model.segments, model.element)
     return replace(
         loading,
