@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from .description.actuation import Magnet as Magnet
     from .description.actuation import MagneticField as MagneticField
     from .description.contacts import Contact as Contact
+    from .description.field_tables import FieldTable as FieldTable
     from .description.formulas import Formula as Formula
     from .description.laws import Bilinear as Bilinear
     from .description.laws import ElasticPlastic as ElasticPlastic
@@ -155,6 +156,7 @@ _PUBLIC = {
     "codegen.folder": "export",
     "codegen.timestep": "TimeStep",
     "description.actuation": "Actuation Magnet MagneticField",
+    "description.field_tables": "FieldTable",
     "description.contacts": "Contact",
     "description.laws": "Bilinear ElasticPlastic MomentTable Plateau Potential RambergOsgood Ribbon Sadowsky "
     "StressStrain Superelastic",

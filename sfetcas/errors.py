@@ -38,6 +38,7 @@ class Status(enum.Enum):
     UNMET = "no values of the unknowns within their bounds meet all that is asked for"
     STRETCHED = "no finite force holds the members"
     BENT = "a small member bends beyond linear elasticity"
+    OUTSIDE = "a magnet leaves the table of its field"
     UNBOUNDED = "the loads are not held: the energy falls without bound"
     STOPPED = "the motion could not be followed further"
     INTERRUPTED = "interrupted: what was computed up to then is kept"

@@ -214,7 +214,7 @@ def test_energies_of_members_and_springs_add_up_to_the_strain_energy():
 
 
 def test_expressions_say_what_answers_say():
-    """Each name that both know, of a frame in the plane and of a bent rod in space."""
+    """Each name that both know, of a frame in the plane, of a bent rod in space, and of one that stretches."""
     square = {"shape": "rectangle", "width": 0.03, "height": 0.02, "E": 1e6, "nu": 0.3}
     force = {"f": {"type": "force", "node": "B", "value": [0, 0.002, 0.004]}}
     rod = beam(
@@ -234,7 +234,8 @@ def test_expressions_say_what_answers_say():
         },
     )
     met = set()
-    for scene in (frame(), rod, driven("plane"), driven("space")):
+    yielding = beam({**square, "stretch": True, "shear": True}, loads=force)
+    for scene in (frame(), rod, yielding, driven("plane"), driven("space")):
         names = []
         for kind in (kind for kind in ANSWERS if {"statics", "parameters"} <= set(kind.where)):
             table = {"reactions": "nodes"}.get(kind.table, kind.table)

@@ -64,6 +64,7 @@ ORDER = [
     "description.tendons",
     "description.tubes",
     "description.loads",
+    "description.field_tables",
     "description.actuation",
     "description.contacts",
     "description.obstacles",

@@ -169,3 +169,22 @@ def test_short_elements():
     scenes = {"discs": robot(True), "much": robot(True, (12.0, 6.0)), "along": robot(False)}
     orders = {name: Meshing(scene, Settings(accuracy=1e-9)).target.order for name, scene in scenes.items()}
     assert orders == {"discs": 4, "much": 6, "along": 6}
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_strains_as_answers(dimension):
+    """Parametric solvers tell of strains what statics does, with their derivatives, through discs under loads."""
+    scene = rod(WAY, dimension, tension=T).to_dict()
+    scene["sections"]["s"] |= {"EA": 500.0, "GA2": 200.0, **({"GA3": 150.0} if dimension == "space" else {})}
+    across = 2.0 if dimension == "space" else 0.0
+    scene["loads"] = {"p": {"type": "force", "node": "B", "value": [1.0, -3.0, across]}}
+    scene["nodes"]["B"]["position"] = [0.9, 0.4]
+    family = sfetcas.parametric(Scene.from_dict(scene), ["sections.s.EA"], ["members.m.strain at 0.31"])
+    found = family.solve()
+    exact = sfetcas.solve(Scene.from_dict(scene)).last.along("m", [0.31])["strain"][0]
+    # Of two meshes, each with an error of 1e-6 at most.
+    np.testing.assert_allclose(found["members.m.strain at 0.31"], exact, atol=1e-6)
+    low, high = (family.solve({"sections.s.EA": ea}, start=found)["members.m.strain at 0.31"] for ea in (495.0, 505.0))
+    slope = found.jacobian["members.m.strain at 0.31"]["sections.s.EA"].ravel()
+    # Of differences over a hundredth of what changes, the square is left.
+    np.testing.assert_allclose(slope, (high - low) / 10.0, rtol=1e-3, atol=1e-9)

@@ -871,9 +871,28 @@ def test_members_that_do_not_bend_so(kind):
         scene(members={"beam": {"nodes": ["A", "B"], "section": "s", "type": kind}})
 
 
-def test_curvature_of_a_law_is_no_result():
-    with pytest.raises(SceneError, match="found the curvature of a member whose section has a law"):
-        sfetcas.parametric(scene(RAMBERG), ["loads.tip.value"], ["members.beam.curvature at 0"])
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_curvature_as_answer_of_parametric_solvers(dimension):
+    """Of a bilinear law under a moment beyond its knee k = M0 + (M - M0) / 0.2, with its derivatives."""
+    names, asked = ["loads.tip.value", "sections.s.law.moment"], "members.beam.curvature at 0.3"
+    family = sfetcas.parametric(scene(BILINEAR, dimension=dimension), names, [asked])
+    answer = family.solve({"sections.s.law.moment": 0.9})
+    np.testing.assert_allclose(answer[asked], [0.0, 0.0, 0.9 + 0.6 / 0.2], atol=1e-9)
+    slopes = [answer.jacobian[asked][name].ravel()[2] for name in names]
+    np.testing.assert_allclose(slopes, [5.0, -4.0], atol=1e-8)
+
+
+@pytest.mark.parametrize("law", [RAMBERG, None], ids=["ramberg-osgood", "ribbon"])
+def test_curvatures_of_statics_and_parametric_solvers(law):
+    """Both say the same on one mesh, under a force across both axes."""
+    section, load = (RIBBON, [0.0, 0.004, -0.03]) if law is None else (given(law), [0.3, -0.8, 0.5])
+    bent = scene(section=section, load=force(load), dimension="space")
+    mesh, places = sfetcas.Settings(element="SFET5", elements=4), [0.0, 0.3, 0.9]
+    asked = [f"members.beam.curvature at {x}" for x in places]
+    found = sfetcas.parametric(bent, ["loads.tip.value"], asked, settings=mesh).solve()
+    exact = sfetcas.solve(bent, mesh).last.along("beam", places)["curvature"]
+    # Both to the residuals of their solvers.
+    np.testing.assert_allclose([found[name] for name in asked], exact, atol=1e-8)
 
 
 def test_files(tmp_path):

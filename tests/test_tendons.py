@@ -713,7 +713,7 @@ def test_control_of_a_servo():
 def test_picture():
     """A tendon is drawn where it is: along the deformed member, and from hole to hole; a slack one is thinner."""
     pytest.importorskip("matplotlib").use("Agg")
-    from test_plotting import drawn, named
+    from test_plotting import drawn, named, texts
 
     tendons = {
         "along": {"way": [{"member": "m", "offset": D}], "tension": T},
@@ -732,6 +732,9 @@ def test_picture():
     np.testing.assert_allclose(first[0], [0.0, -0.2], atol=1e-12)
     thin, thick = (named(figure, f"tendon-{name}")[0].get_linewidth() for name in ("holes", "along"))
     assert thin < thick
+    # The legend says what they are.
+    assert "tendon" in texts(figure)
+    assert "chamber" in texts(sfetcas.solve(rod(pressure=3e5, area=1e-5)).last.plot())
 
 
 # -- what is refused -----------------------------------------------------------------------------------

@@ -55,6 +55,7 @@ TABLES = {
     "Motion": ("Motions", "`[motions.NAME]`: prescribed displacements and rotations"),
     "Actuation": ("Actuations", "`[actuations.NAME]`: natural curvature and twist of members"),
     "MagneticField": ("Magnetic fields", "`[fields.NAME]`"),
+    "FieldTable": ("Magnetic fields: table", "`table = { ... }` of a field: columns, or the CSV file of them"),
     "Magnet": ("Magnets", "`[magnets.NAME]`: magnetised members and dipoles"),
     "History": ("Histories", "`[histories.NAME]`"),
     "Contact": ("Contacts", "`[contacts.NAME]`: frictionless obstacles"),

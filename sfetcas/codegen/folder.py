@@ -123,6 +123,10 @@ def _made(
     derivatives: bool,
 ) -> tuple[EquilibriumSolver | TimeStep | Derivatives, dict[str, str]]:
     """The object that is exported, and the texts of its files by name."""
+    for key, field in scene.fields.items():
+        if field.table is not None and scene.magnets:
+            message = "found a table, whose splines are not written in C, accepted: another type of field"
+            raise SceneError(message, ("fields", key))
     made: EquilibriumSolver | TimeStep | Derivatives
     given: dict[str, Any] = {"arguments": arguments, "settings": settings}
     writer: Writer

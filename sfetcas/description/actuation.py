@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.arrays import numbers
+from .field_tables import Tabulated
 from .formulas import Formula
 from .records import Direction, Fraction, OnPart, Record, Turn, Vector, listed, number, say
 from .sections import Quantity, Varying, breaks, evaluate
@@ -102,7 +103,7 @@ class Actuation(_AlongMember, Record):
 
 
 class MagneticField(Record):
-    """A magnetic field that is given: uniform, with a constant gradient, or that of a dipole.
+    """A magnetic field that is given: uniform, with a constant gradient, that of a dipole, or a table.
 
     The magnets of the scene do not change it, and do not act on each other.
 
@@ -110,7 +111,8 @@ class MagneticField(Record):
     ----------
     type : text
         ``uniform``; ``linear``: ``value`` at ``position``, and from there it changes by ``gradient``; ``dipole``: of
-        a small magnet at ``position``, with the dipole ``moment``; ``function``: any, from Python.
+        a small magnet at ``position``, with the dipole ``moment``; ``table``: between the points of a grid;
+        ``function``: any, from Python.
     value : (3,), T, fixed axes
         The field at factor 1; of a linear one at ``position``.
     gradient : (3, 3), T/m, fixed axes
@@ -120,6 +122,9 @@ class MagneticField(Record):
         Of a linear field where it has the ``value``; of a dipole its place.  Default: the origin.
     moment : (3,), A m², fixed axes
         Of a dipole.
+    table : table or file name
+        Of a field of type ``table``: columns ``x``, ``y``, ``z`` (m), ``Bx``, ``By``, ``Bz`` (T), or the name of a CSV
+        file that has them, in a scene file relative to its folder.
     function : callable
         In Python: place (3,), m, numbers or CasADi expressions -> field (3,), T, at factor 1.
     history : name
@@ -131,11 +136,12 @@ class MagneticField(Record):
     0.0002
     """
 
-    type: Literal["uniform", "linear", "dipole", "function"] = "uniform"
+    type: Literal["uniform", "linear", "dipole", "table", "function"] = "uniform"
     value: Vector | None = None
     gradient: Gradient | None = None
     position: Vector = (0.0, 0.0, 0.0)
     moment: Direction | None = None
+    table: Tabulated | None = None
     function: Callable[[Any], Any] | None = None
     history: str | None = None
 
@@ -149,13 +155,10 @@ class MagneticField(Record):
 
     @model_validator(mode="after")
     def _check(self) -> MagneticField:
-        needed = {"uniform": "value", "linear": "gradient", "dipole": "moment", "function": "function"}[self.type]
-        useless = {
-            "uniform": ("gradient", "moment", "position", "function"),
-            "linear": ("moment", "function"),
-            "dipole": ("value", "gradient", "function"),
-            "function": ("value", "gradient", "moment", "position"),
-        }[self.type]
+        needed = {"uniform": "value", "linear": "gradient", "dipole": "moment"}.get(self.type, self.type)
+        taken = {"linear": ("value", "gradient", "position"), "dipole": ("moment", "position")}
+        every = ("value", "gradient", "position", "moment", "table", "function")
+        useless = [key for key in every if key not in taken.get(self.type, (needed,))]
         if getattr(self, needed) is None:
             raise SceneError(f"the key {needed!r} is missing: a field of type {self.type!r} needs it")
         for key in useless:
@@ -181,16 +184,21 @@ class MagneticField(Record):
         SceneError
             It fails, or gives other than three numbers.
         """
-        assert self.function is not None
+        assert self.by_place is not None
         try:
             with np.errstate(all="ignore"):
-                found = np.array(self.function(place), dtype=float).ravel()
+                found = np.array(self.by_place(place), dtype=float).ravel()
         except (TypeError, ValueError, AttributeError, IndexError, ArithmeticError, NotImplementedError) as error:
             message = f"found a function that fails ({error}), accepted: {FUNCTION}"
             raise SceneError(message, ("function",)) from None
         if found.size != 3:
             raise SceneError(f"found {found.size} components, accepted: {FUNCTION}", ("function",))
         return found
+
+    @property
+    def by_place(self) -> Callable[[Any], Any] | None:
+        """Place (3,), m, to field (3,), T, numbers or CasADi expressions, of a table or a function."""
+        return self.table if self.table is not None else self.function
 
     @property
     def uniform(self) -> bool:
@@ -205,7 +213,7 @@ class MagneticField(Record):
     def of(self, place: ArrayLike) -> NDArray[np.float64]:
         """The field (..., 3), T, at places (..., 3), m, in the fixed axes, at factor 1."""
         apart = np.asarray(place, dtype=float) - np.array(self.position)
-        if self.function is not None:
+        if self.by_place is not None:
             return np.array([self._called(each) for each in apart.reshape(-1, 3)]).reshape(apart.shape)
         if self.type == "dipole":
             moment = np.array(self.moment)
@@ -220,8 +228,11 @@ class MagneticField(Record):
         """A magnitude, T, or of a dipole T m³."""
         if self.type == "dipole" and self.moment is not None:
             return PERMEABILITY * math.hypot(*self.moment)
+        if self.table is not None:
+            return self.table.largest
         if self.function is not None:
-            return float(np.linalg.norm(self._called(ANYWHERE)))
+            size = float(np.linalg.norm(self._called(ANYWHERE)))
+            return size if math.isfinite(size) else 0.0
         return math.hypot(*self.vector)
 
 

@@ -140,7 +140,7 @@ members.NAME.angle at | rad | | all | the same in the plane, counting turns
 members.NAME.force at | N | x y z | statics, motion, parameters | section force: of what is beyond on what is before
 members.NAME.moment at | N m | x y z | statics, motion, parameters | section moment, likewise
 members.NAME.curvature at | 1/m | b1 b2 b3 | statics, motion, parameters | whole curvature about b1 (twist), b2, b3
-members.NAME.strain at | | b1 b2 b3 | statics, motion | stretch along b1, shear along b2, b3, where the section yields
+members.NAME.strain at | | b1 b2 b3 | statics, motion, parameters | stretch (b1), shear (b2, b3), where it yields
 members.NAME.bending_strain at | | | statics, motion, parameters | largest, with a shape and neither law nor coupling
 members.NAME.bending_stress at | Pa | | statics, motion, parameters | E times that strain
 members.NAME.velocity at | m/s | x y z | motion | of the centre line; not of small members

@@ -271,6 +271,12 @@ class Scene(Record):
         return springs or any(tendon.may_be_slack for tendon in self.tendons.values())
 
     @property
+    def limited(self) -> bool:
+        """Whether there is what answers must not go beyond: small members, or magnets in fields that are tables."""
+        tables = bool(self.magnets) and any(field.table is not None for field in self.fields.values())
+        return tables or any(member.type == "small" for member in self.members.values())
+
+    @property
     def reversed(self) -> bool:
         """Whether tendons with friction are let out at a load factor, so that each factor has equations of its own."""
         return any(self.released_at_steps())

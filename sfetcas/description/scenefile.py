@@ -151,7 +151,7 @@ def _read(path: Path) -> str:
         raise SceneError(str(error)) from None
 
 
-FILES = {"members": ("stiffness", "mass"), "histories": ("table",)}
+FILES = {"members": ("stiffness", "mass"), "histories": ("table",), "fields": ("table",)}
 """Keys that may name a file beside that of the scene, by their tables."""
 
 

@@ -104,6 +104,10 @@ class Formulation(Statement):
             raise SceneError(message, ("analysis", "type"))
         if not cases:
             raise SceneError("found no case, accepted: one or more", ("cases",))
+        for name, field in scene.fields.items():
+            if field.table is not None and scene.magnets:
+                message = "found a table, with which no design knows where it ends, accepted: another type of field"
+                raise SceneError(message, ("fields", name))
         steps = (float(scene.analysis.steps[-1]),)
         analysis = scene.analysis.model_copy(update={"steps": steps, "equilibria": "one"})
         self.scene = scene.model_copy(update={"analysis": analysis, "expect": ()})

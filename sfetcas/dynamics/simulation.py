@@ -216,9 +216,10 @@ class Simulation:
         return any(not self.scene.sections[str(one.section)].mass(HEAVY).all() for one in members)
 
     def _refuse_large(self, instant: MotionState) -> None:
-        message = instant.fields.too_large() if self.superelements else ""
+        message = instant.fields.too_large() if self.scene.limited else ""
         if message:
-            raise SolveError(Status.BENT, f"at {instant.time:.6g} s: {message}")
+            status = Status.OUTSIDE if instant.fields.beyond_tables() else Status.BENT
+            raise SolveError(status, f"at {instant.time:.6g} s: {message}")
 
     def begun(self, system: StageEquations) -> tuple[InitialState, tuple[str, ...]]:
         """Where the motion begins, and what is to be said of it."""
@@ -268,7 +269,7 @@ class Simulation:
         run = self.run(mesh, 0)
         for rounds in range(1, 1 + ROUNDS if analysis.step is None else 1):
             failed = run.failure is not None
-            bent = run.failure is not None and run.failure.status is Status.BENT
+            bent = run.failure is not None and run.failure.status in (Status.BENT, Status.OUTSIDE)
             if run.interrupted or bent or (failed and (self.prescribed or rounds > RESCUES)):
                 break
             mesh = mesh if self.prescribed else mesh.refined()

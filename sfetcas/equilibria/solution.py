@@ -598,16 +598,17 @@ LARGEST_AXIAL_FORCE = 0.1
 
 
 def refuse_large(fields: Fields) -> None:
-    """Refuse a state in which a small member is deformed so far that linear elasticity has no meaning.
+    """Refuse a state in which a small member is deformed so far that linear elasticity has no meaning, or a magnet is
+    where the table of a field ends.
 
     Raises
     ------
     SolveError
-        Names the small member with the largest deformation.
+        Names the small member with the largest deformation, or the magnet.
     """
     message = fields.too_large()
     if message:
-        raise SolveError(Status.BENT, message)
+        raise SolveError(Status.OUTSIDE if fields.beyond_tables() else Status.BENT, message)
 
 
 def _notes(fields: Fields) -> Iterator[str]:

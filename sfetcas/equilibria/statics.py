@@ -22,7 +22,7 @@ from .meshing import EquilibriumResult, Meshing
 from .refinement import Refinement
 from .settings import Settings, settings_with
 from .single import solve_model
-from .solution import Equilibrium, Solution, at_factor
+from .solution import Equilibrium, Solution, at_factor, refuse_large
 from .ways import Ways
 
 if TYPE_CHECKING:
@@ -106,7 +106,10 @@ class LoadSteps:
                     continue
                 found = self.ways.result(pilot, factor, last)
                 last = (factor, found) if found.solved.prepared is pilot else None
-                steps.append(self.refinement.refined(found))
+                refined = self.refinement.refined(found)
+                if self.scene.limited:
+                    refuse_large(refined.fields)
+                steps.append(refined)
                 if further is not None:
                     steps[-1:] = further.answers(found, steps[-1])
             except SolveError as error:

@@ -12,6 +12,7 @@ from ..description.records import counted
 from ..errors import SolveError, Status
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
+from ..mechanics.magnetism import where_fields_end
 from ..solvers.continuation import CONTRACTION, JUMPED, between, follow, near_factor
 from ..solvers.deflation import nearest
 from ..solvers.prepared import BEYOND, Prepared, Solved
@@ -228,6 +229,7 @@ class Ways:
         if taut and error.status not in (Status.INFEASIBLE, Status.STRETCHED):
             rows = ", ".join(dict.fromkeys(free.redundant))
             details.append(f"{TAUT}: {rows}")
+        details += [] if error.status is Status.OUTSIDE else where_fields_end(self.scene)
         return SolveError(error.status, "; ".join(details), error.last)
 
     # -- single ways ----------------------------------------------------------------------------------

@@ -155,9 +155,16 @@ def _strength(scene: Scene) -> Callable[[str], float]:
 
     def at(node: str) -> float:
         fields = scene.fields.values()
-        return float(sum(np.linalg.norm(field.of(scene.nodes[node].position)) for field in fields))
+        return float(sum(_finite(field.of(scene.nodes[node].position)) for field in fields))
 
     return at
+
+
+def _finite(values: Array) -> float:
+    """Largest magnitude, T, of field vectors (..., 3), without what is not finite."""
+    with np.errstate(all="ignore"):
+        sizes = np.linalg.norm(values, axis=-1)
+    return float(np.where(np.isfinite(sizes), sizes, 0.0).max())
 
 
 def magnetic(scene: Scene, member: str) -> float:
@@ -169,8 +176,7 @@ def magnetic(scene: Scene, member: str) -> float:
         if magnet.member == member:
             places = scene.center_lines[member].positions(x)
             strength = sum(
-                _largest(scene, field.history) * np.linalg.norm(field.of(places), axis=1).max()
-                for field in scene.fields.values()
+                _largest(scene, field.history) * _finite(field.of(places)) for field in scene.fields.values()
             )
             found += float(np.linalg.norm(magnet.along(x), axis=1).max() * strength)
     return found

@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import tolerances
 from ..description.answers import single_number
+from ..description.records import enumerated
 from ..description.tendons import Stretch
 from ..mathematics import curves, quaternion
 from ..mathematics.arrays import Array, first_of_largest, values_of
@@ -335,14 +336,19 @@ class Fields:
 
     def magnet(self, name: str) -> dict[str, Any]:
         """What the fields do to a magnet: ``energy`` (N m), ``torque`` (3,) N m and ``force`` (3,) N."""
-        model, total = self.model, np.zeros(7)
+        model, total = self.model, self._of_magnet(name).sum(axis=0)
+        energy, torque = float(total[0] * model.scales.moment), total[1:4] * model.scales.moment
+        return {"energy": energy, "torque": torque, "force": total[4:7] * model.scales.force}
+
+    def _of_magnet(self, name: str) -> Array:
+        """What each term of a magnet answers, (n, 8), dimensionless."""
+        model, found = self.model, [np.zeros((0, 8))]
         loads = self._loading.before or self._loading.loads
         for number, own in magnet_terms(model.connections, name):
             group = model.connections[number]
             batch = GroupBatch(model, group, answers_of(group.kind))
-            total += batch(self.q, self._nodal, self.state.unwrapped, loads[number])[0][own].sum(axis=0)
-        energy, torque = float(total[0] * model.scales.moment), total[1:4] * model.scales.moment
-        return {"energy": energy, "torque": torque, "force": total[4:] * model.scales.force}
+            found.append(batch(self.q, self._nodal, self.state.unwrapped, loads[number])[0][own])
+        return np.concatenate(found)
 
     def _along(self, member: str, x: Array, *, pressed: bool = True) -> dict[str, Array]:
         """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted."""
@@ -754,8 +760,23 @@ class Fields:
         size = np.linalg.norm(rest - rest[0], axis=1).max()
         return float(max(np.linalg.norm(moved, axis=1).max() / size, np.linalg.norm(spins, axis=1).max()))
 
+    def beyond_tables(self) -> str:
+        """A sentence on a magnet that is where the table of a field ends; else empty."""
+        scene = self.model.scene
+        tables = [name for name, field in scene.fields.items() if field.table is not None]
+        for name in scene.magnets if tables else ():
+            if self._of_magnet(name)[:, 7].max(initial=0.0) > tolerances.WRITTEN:
+                which = enumerated([repr(table) for table in tables])
+                return f"{name!r} is outside of the table of the field {which}, beyond which there is none"
+        return ""
+
     def too_large(self) -> str:
-        """A sentence on the small member deformed most, where its linear elasticity is meaningless; else empty."""
+        """A sentence on the small member deformed most, where its linear elasticity is meaningless, or on a magnet
+        beyond the table of a field; else empty.
+        """
+        beyond = self.beyond_tables()
+        if beyond:
+            return beyond
         superelements = {name: self.bent(name) for name, m in self.model.scene.members.items() if m.type == "small"}
         worst = [*superelements, ""][first_of_largest(np.array([*superelements.values(), 0.0]))]
         if not superelements.get(worst, 0.0) > LARGE:

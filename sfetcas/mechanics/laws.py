@@ -10,6 +10,7 @@ numbers ``kappa`` is over a unit of curvature of the law, and ``d`` over its uni
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, final
@@ -29,7 +30,16 @@ from .elements import Element, element_by_name
 from .parts import Parts
 from .terms import ARGUMENTS, One, Side, Term, name_of
 
-__all__ = ["AlongElement", "curvature_by_moment", "law_of", "laws_in", "least_stiffness", "solved"]
+__all__ = [
+    "AlongElement",
+    "bent_by",
+    "curvature_by_moment",
+    "law_data",
+    "law_of",
+    "laws_in",
+    "least_stiffness",
+    "solved",
+]
 
 PLACE = 10
 """Numbers of a point in space before those of the form: energy, nine of the axes over the unit of curvature."""
@@ -276,6 +286,44 @@ def solved(rest: Array, values: Array, derivatives: ca.Function, moment: Array, 
 
 NEWTON_STEPS = 30
 """From the curvature of the elements it takes two or three."""
+
+
+@functools.cache
+def bent_by(form: Form, axes: tuple[int, ...]) -> ca.Function:
+    """``(moment, near, data) ->`` changes of the curvatures (3,), 1/m, at which a law gives the moments (3,), N m.
+
+    As :func:`curvature_by_moment`, at one place, by :data:`SYMBOLIC_STEPS` of Newton's method; ``data`` are those of
+    :func:`law_data`.
+    """
+    chosen, derivatives = list(axes), derivatives_of(form)
+    moment, change, data = ca.SX.sym("moment", 3), ca.SX.sym("change", 3), ca.SX.sym("data", 11 + form.size)
+    rest, unit, bent = ca.reshape(data[:9], 3, 3), data[9], data[10]
+    _, gradient, hessian = derivatives(change / bent, data[11:])
+    now = ca.mtimes(rest, change) + gradient * (unit / bent)
+    slope = rest + ca.reshape(hessian, 3, 3) * (unit / bent**2)
+    miss = (moment - now)[chosen]
+    there = ca.SX(change)
+    there[chosen] += ca.solve(slope[chosen, chosen], miss)
+    step = ca.Function("step", [moment, change, data], [there, ca.norm_inf(miss)], {"cse": True})
+    given = [ca.MX.sym("moment", 3), ca.MX.sym("near", 3), ca.MX.sym("data", 11 + form.size)]
+    found = given[1]
+    for _ in range(SYMBOLIC_STEPS):
+        found = step(given[0], found, given[2])[0]
+    size = ca.norm_inf(given[0]) + ca.norm_inf(ca.mtimes(ca.reshape(given[2][:9], 3, 3), given[1]))
+    met = step(given[0], found, given[2])[1] <= tolerances.WRITTEN * size
+    return ca.Function(f"bent_by_{form}_{'_'.join(map(str, axes))}", given, [ca.if_else(met, found, given[1])])
+
+
+SYMBOLIC_STEPS = 5
+"""Steps of Newton's method where they are expressions."""
+
+
+def law_data(scene: Scene, member: str, x: Array) -> Array:
+    """Of the law of a member at fractions x (n,): stiffness at rest, units and numbers, (n, 11 + size)."""
+    section = scene.sections[str(scene.members[member].section)]
+    assert section.law is not None
+    values = section.law.values(section, x)
+    return numbers(np.concatenate([section.stiffness_matrix(x).reshape(len(x), 9), values], axis=1))
 
 
 def least_stiffness(scene: Scene, member: str, x: Array, change: Array, axes: list[int]) -> Array:

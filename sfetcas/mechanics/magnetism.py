@@ -19,15 +19,17 @@ import numpy as np
 
 from .. import tolerances
 from ..description.actuation import ANYWHERE, PERMEABILITY, Magnet, MagneticField
+from ..description.records import enumerated, say
+from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, numbers
+from ..mathematics.arrays import Array, numbers, values_of
 from .actuation import points_of
 from .elements import Element
 from .parts import Parts
 from .terms import Discrete, Group, One, Side, Term
 
-__all__ = ["Dipole", "Magnetised", "magnet_terms", "magnets_in"]
+__all__ = ["Dipole", "Magnetised", "magnet_terms", "magnets_in", "where_fields_end"]
 
 Law = Literal["uniform", "linear", "dipole"]
 """How a field depends on the place, as the types of :class:`~sfetcas.MagneticField`."""
@@ -35,13 +37,14 @@ Law = Literal["uniform", "linear", "dipole"]
 
 @dataclass(frozen=True)
 class FieldFunction:
-    """A field as a function of the place from Python, with the unit of length (m) of the model."""
+    """A field as a table, or a function of the place from Python, with the unit of length (m) of the model."""
 
     field: MagneticField
     unit: float
 
     def __hash__(self) -> int:
-        return hash((id(self.field.function), self.unit))
+        table = self.field.table
+        return hash((id(self.field.function) if table is None else table.digest, self.unit))
 
     def __post_init__(self) -> None:
         """Refuse a function that takes numbers only, or makes something else of expressions.
@@ -58,15 +61,24 @@ class FieldFunction:
         except (TypeError, ValueError, AttributeError, NotImplementedError, RuntimeError):
             raise SceneError(sentence) from None
         found, wanted = function(ANYWHERE / self.unit).full().ravel(), self.field.of(ANYWHERE)
-        if not np.allclose(found, wanted, rtol=tolerances.WRITTEN, atol=0.0):
+        if not np.allclose(found, wanted, rtol=tolerances.WRITTEN, atol=0.0, equal_nan=True):
             raise SceneError(sentence)
 
     def expression(self, place: ca.SX) -> ca.SX:
         """The field (3,), T, at a place (3,) over the unit of length."""
-        assert self.field.function is not None
-        found = self.field.function(self.unit * place)
+        assert self.field.by_place is not None
+        found = self.field.by_place(self.unit * place)
         entries: list[ca.SX] = list(found) if isinstance(found, (list, tuple)) else [ca.SX(found)]
         return ca.vertcat(*entries)
+
+    def beyond(self, place: ca.SX) -> ca.SX:
+        """How far a place over the unit of length is outside of a table, over the size of that; zero of a function."""
+        table = self.field.table
+        if table is None:
+            return ca.SX(0)
+        sizes = [high - low for low, high in table.ends.values()]
+        at = self.unit * (place if place.numel() == 3 else ca.vertcat(place, 0))
+        return ca.mmax(ca.vertcat(*[far / size for far, size in zip(table.beyond(at), sizes, strict=True)]))
 
     def __str__(self) -> str:
         return f"function{_numbered(self)}"
@@ -97,9 +109,15 @@ class _InField(Term):
         "energy": "J",
         **{f"torque_{axis}": "N m" for axis in "xyz"},
         **{f"force_{axis}": "N" for axis in "xyz"},
+        "beyond": "1",
     }
 
     law: Law | FieldFunction
+
+    @property
+    def looks_up(self) -> bool:  # type: ignore[override]
+        """Whether the field is a table."""
+        return isinstance(self.law, FieldFunction) and self.law.field.table is not None
 
     @property
     def proportional(self) -> bool:
@@ -159,11 +177,15 @@ class _InField(Term):
         return energies, forces, couples
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
-        """Energy, torque about the places of the magnets, and force."""
+        """Energy, torque about the places of the magnets, force, and how far it is beyond a table over its size."""
         energies, forces, couples = (sum(part[1:], part[0]) for part in self.acting(q, u, data, load))
         nothing = [ca.SX(0), ca.SX(0)]
         torque = ca.vertsplit(couples) if self.space else [*nothing, couples]
-        return [energies, *torque, *[*ca.vertsplit(forces), ca.SX(0)][:3]]
+        beyond = ca.SX(0)
+        if isinstance(self.law, FieldFunction):
+            for _, place, _, _ in self.magnets(q, u, data):
+                beyond = ca.fmax(beyond, self.law.beyond(place))
+        return [energies, *torque, *[*ca.vertsplit(forces), ca.SX(0)][:3], beyond]
 
 
 @final
@@ -256,9 +278,43 @@ def magnets_in(parts: Parts) -> Iterator[One]:
     """
     scene = parts.scene
     for name, magnet in scene.magnets.items():
+        _check_inside(parts, name, magnet)
         for law, position, loads in _laws(scene.fields, parts):
             found = _at_node if magnet.member is None else _along_member
             yield from found(parts, name, magnet, law, position, loads)
+
+
+def where_fields_end(scene: Scene) -> list[str]:
+    """Of a scene with fields that end with their tables what may be the reason of a failure."""
+    names = [name for name, field in scene.fields.items() if field.table is not None]
+    if not (names and scene.magnets):
+        return []
+    which = enumerated([repr(name) for name in names])
+    return [f"a magnet may leave the table of the field {which}, beyond which there is none"]
+
+
+def _check_inside(parts: Parts, name: str, magnet: Magnet) -> None:
+    """Refuse a magnet that is in the undeformed scene where a field has no value."""
+    scene = parts.scene
+    if magnet.member is None:
+        places = values_of(scene.nodes[str(magnet.node)].position)[None, :]
+    else:
+        x = values_of(points_of(parts, magnet.member))[inside(parts, magnet.member, magnet.span)]
+        places = values_of(scene.center_lines[magnet.member].positions(x.ravel()))
+    for key, field in scene.fields.items():
+        if field.uniform:
+            continue
+        beyond = None if field.table is None else field.table.outside(places)
+        if beyond is not None:
+            axis, at, low, high = beyond
+            message = f"the magnet {name!r} is at {axis} = {at:.6g} m, outside of the table from {low:g} to {high:g} m"
+            raise SceneError(f"{message}, accepted: a table around all places of the magnets", ("fields", key))
+        with np.errstate(all="ignore"):
+            lost = np.flatnonzero(~np.isfinite(field.of(places)).all(axis=1))
+        if len(lost):
+            where = say(tuple(places[lost[0]].tolist()))
+            message = f"the field is not finite at {where} m, where the magnet {name!r} is in the undeformed scene"
+            raise SceneError(f"{message}, accepted: one that is finite at all magnets", ("fields", key))
 
 
 def _laws(
@@ -270,7 +326,7 @@ def _laws(
     uniform: dict[str | None, Any] = {}
     for field in fields.values():
         position = numbers(field.position)[:axes]
-        if field.function is not None:
+        if field.by_place is not None:
             found.append((FieldFunction(field, float(unit)), position, {field.history: np.ones(1)}))
         elif field.uniform:
             value = numbers(field.vector)[:axes]

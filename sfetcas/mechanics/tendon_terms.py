@@ -7,6 +7,7 @@ the sections, so that the derivative of its places by the arc length has the len
 
 in which everything is in the axes before the rotation: a function of the rotations of the element alone.  A straight
 piece goes from a hole ``x_a + R_a d_a`` to a hole ``x_b + R_b d_b``, a function of two rotations and two places.
+Within a member ``x_b - x_a`` is the chord of the elements between the holes: a function of their rotations alone.
 
 A tendon whose force is given has the energy tension times change of length.  One whose length is given is one row,
 to which all its parts add, and its multiplier is the tension; where it is elastic a further place, of which nothing

@@ -118,6 +118,9 @@ class Term(Components, abc.ABC):
     on_face: ClassVar[bool] = False
     """Whether its row keeps a place on the surface of an obstacle."""
 
+    looks_up: ClassVar[bool] = False
+    """Whether it has tables in it, among which it would take long to look for what is the same."""
+
     @property
     def spans(self) -> int:
         """Along how many elements it is a string between two of their nodes, whose pull they do not carry; else 0.
@@ -280,7 +283,7 @@ class Term(Components, abc.ABC):
         symbols = whole.sx_in()
         found = whole.call(symbols)
         names = whole.name_in()
-        return _shared(f"forces_{name_of(self)}", symbols, [found[2], found[3]], names, ["rows", "gradient"])
+        return _shared(f"forces_{name_of(self)}", symbols, [found[2], found[3]], names, ["rows", "gradient"], self)
 
     def slopes(self) -> ca.Function:
         """The function :func:`slopes_of` of this kind."""
@@ -428,10 +431,10 @@ def _symbols(kind: Term) -> tuple[list[ca.SX], tuple[list[Side], list[Side]]]:
 
 
 def _shared(
-    name: str, arguments: list[ca.SX], results: list[ca.SX], given: list[str], outputs: list[str]
+    name: str, arguments: list[ca.SX], results: list[ca.SX], given: list[str], outputs: list[str], kind: Term
 ) -> ca.Function:
     """A function that evaluates each common subexpression once: derivatives repeat sines and cosines many times."""
-    return ca.Function(name, arguments, results, given, outputs, {"cse": True})
+    return ca.Function(name, arguments, results, given, outputs, {"cse": not kind.looks_up})
 
 
 @functools.cache
@@ -507,7 +510,7 @@ def _rotation_gradient(kind: Term) -> ca.Function:
         ca.densify(ca.mtimes(ca.jacobian(rows, x), basis)),
     ]
     names = ["energy", "stored", "rows", "gradient", "stiffness", "rotation_jacobian"]
-    return _shared(f"rotation_gradient_{name_of(kind)}", arguments, results, [*ARGUMENTS], names)
+    return _shared(f"rotation_gradient_{name_of(kind)}", arguments, results, [*ARGUMENTS], names, kind)
 
 
 def _halves(forces: ca.SX, rotations: int, space: bool) -> ca.SX:
@@ -539,7 +542,7 @@ def _slopes(kind: Term) -> ca.Function:
     arguments, energy, rows, _ = _expressions(kind)
     x = ca.vertcat(ca.vec(arguments[0]), ca.vec(arguments[1]))
     results = [ca.densify(ca.gradient(energy, x)), ca.densify(ca.jacobian(rows, x))]
-    return _shared(f"slopes_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], ["gradient", "jacobian"])
+    return _shared(f"slopes_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], ["gradient", "jacobian"], kind)
 
 
 @functools.cache
@@ -553,7 +556,7 @@ def _curvatures(kind: Term) -> ca.Function:
     x, weight = ca.vertcat(ca.vec(arguments[0]), ca.vec(arguments[1])), ca.SX.sym("weight")
     hessian = ca.densify(ca.hessian(weight * energy + ca.dot(arguments[4], rows), x)[0])
     given = [*ARGUMENTS, "weight"]
-    return _shared(f"curvatures_{name_of(kind)}", [*arguments, weight], [hessian], given, ["hessian"])
+    return _shared(f"curvatures_{name_of(kind)}", [*arguments, weight], [hessian], given, ["hessian"], kind)
 
 
 @functools.cache
@@ -561,7 +564,7 @@ def energies_of(kind: Term) -> ca.Function:
     """``(q, u, data, load) ->`` energy of a kind, and its part without loads."""
     arguments, energy = _symbols(kind)[0], _energy(kind)
     results, names = [energy + _work(kind), _stored(kind)], ["energy", "stored"]
-    return _shared(f"energies_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], names)
+    return _shared(f"energies_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], names, kind)
 
 
 @functools.cache
@@ -595,4 +598,4 @@ def densities_of(kind: Term) -> ca.Function:
     found = kind.densities(*sides, *arguments[2:4])
     results = [ca.densify(ca.vertcat(ca.SX(0, 1), *part)) for part in found or ([], [])]
     name = f"densities_{name_of(kind)}"
-    return _shared(name, arguments[:4], results, [*ARGUMENTS[:4]], ["forces", "couples"])
+    return _shared(name, arguments[:4], results, [*ARGUMENTS[:4]], ["forces", "couples"], kind)

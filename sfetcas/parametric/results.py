@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..description.answers import PARAMETERS, STEPS, AnswerName, answer_name, check_answer, single_number
 from ..description.records import unknown
 from ..description.tendons import Stretch
@@ -21,7 +22,7 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers, values_of
 from ..mathematics.constants import sparse, times
 from ..mechanics.connections import connections_of
-from ..mechanics.laws import law_of
+from ..mechanics.laws import bent_by, law_data, law_of
 from ..mechanics.load_terms import spread_of
 from ..mechanics.magnetism import magnet_terms
 from ..mechanics.model import Model
@@ -121,7 +122,7 @@ WHOSE = {
 }
 """How the meaning of a result goes on after its key."""
 
-BY_FORCES = ("force", "moment", "curvature", "bending_strain", "bending_stress")
+BY_FORCES = ("force", "moment", "curvature", "bending_strain", "bending_stress", "strain")
 """Keys of what section forces say along a member."""
 
 
@@ -194,9 +195,6 @@ class Results:
         if kind.table == "stiffness" and node in scene.nodes and scene.nodes[node].support != "free":
             raise SceneError(f"found a node that the ground holds, accepted: a free one, or compliance.{node}")
         check_answer(scene, name, STEPS if self._motion else PARAMETERS)
-        if kind.table == "members" and kind.key == "curvature" and law_of(scene, node) is not None:
-            message = "found the curvature of a member whose section has a law, accepted: its moment or its rotation"
-            raise SceneError(message)
         if set(name.selectors) - {"at"} or (name.at is not None and not kind.along):
             raise SceneError(f"found {name.text!r}, accepted: {name.bare}")
         if not self._unique and (kind.table in ("reactions", "motions") or (kind.along and kind.key in BY_FORCES)):
@@ -211,6 +209,13 @@ class Results:
             if tubed and kind.key in BY_FORCES[2:]:
                 message = f"found the {kind.key.replace('_', ' ')} along a member with tubes, accepted: its position,"
                 raise SceneError(f"{message} rotation, force and moment, or answers of solve(scene)")
+            section = scene.sections[str(scene.members[node].section)]
+            if self._motion and section.relaxation and kind.key in BY_FORCES[2:]:
+                message = f"found the {kind.key.replace('_', ' ')} along a member that relaxes, accepted: its force,"
+                raise SceneError(f"{message} moment, position and rotation")
+            if section.stretch_law is not None and kind.key == "strain":
+                message = "found the strain along a member with a law of stretch, accepted: its force, or answers of"
+                raise SceneError(f"{message} solve(scene)")
         turns = kind.table == "nodes" and kind.key in ("quaternion", "angle")
         if (turns or not kind.key) and node in scene.nodes and self.model.rotations.node_turn[node] is None:
             raise SceneError("found a node that has no rotation of its own")
@@ -230,9 +235,14 @@ class Results:
 
     @property
     def curved(self) -> list[str]:
-        """Members whose curvature is needed for a result."""
+        """Members whose section data are needed for a result."""
         bent = (result.asked for result in self.results if result.asked.kind.key in BY_FORCES[2:])
         return list(dict.fromkeys(name.record for name in bent))
+
+    @property
+    def lawful(self) -> list[str]:
+        """Those whose sections have a law."""
+        return [name for name in self.curved if law_of(self.model.scene, name) is not None]
 
     def refuse_along(self, members: Iterable[str]) -> None:
         """Refuse results along members whose elements move with a parameter, and with them the places within elements.
@@ -249,12 +259,13 @@ class Results:
                 raise SceneError(message, ("results",))
 
     def rest(self, model: Model) -> Array:
-        """Undeformed positions (m) of nodes and places along members, then section data for curvatures; flat."""
+        """Undeformed positions (m) of nodes and places along members, then section data for strains; flat."""
         scene = model.scene
         nodes = [numbers(scene.nodes[name].position) for name in model.nodes]
         along = [scene.center_lines[name].positions(np.array(x)) for name, x in self.every.items()]
         sections = [self._sections(model, name).ravel() for name in self.curved]
         sections += [self.strung_data(model, name).ravel() for name in self.strung]
+        sections += [law_data(scene, name, np.array(self.every[name])).ravel() for name in self.lawful]
         return np.concatenate([*nodes, *(part.ravel() for part in along), *sections])
 
     def strung_data(self, model: Model, member: str) -> Array:
@@ -262,10 +273,11 @@ class Results:
         return section_data(model, member, np.array(self.every[member]), self.model.scales)
 
     def _sections(self, model: Model, member: str) -> Array:
-        """Of a member at its places, (places, 24 or 33).
+        """Of a member at its places, (places, 33 or 42).
 
-        Compliance matrix times the largest stiffness of the first model, curvature times size, axes b1, b2, b3, and of
-        a shape E and the reach of its fibres; where forces bend it, the arms by which they do, m.
+        Compliance matrix times the largest stiffness of the first model, curvature times size, axes b1, b2, b3, of a
+        shape E and the reach of its fibres, and compliance to forces times the unit of force; where forces bend it, the
+        arms by which they do, m.
         """
         scene, x = model.scene, np.array(self.every[member])
         line, section = scene.center_lines[member], scene.sections[str(scene.members[member].section)]
@@ -273,12 +285,17 @@ class Results:
         axes = np.moveaxis(quaternion.matrix(line.quaternions(x)), 2, 1).reshape(len(x), 9)
         curved = line.curvatures(x) * self.model.scene.size
         fibres = np.zeros((len(x), 3)) if section.shape is None else section.fibres(x)
+        yielding = numbers(section.compliance_of_forces(x)).reshape(len(x), 9) * self.model.scales.force
         arms = [section.arms(x).reshape(len(x), 9)] if section.shifted else []
-        return np.concatenate([soft, curved, axes, fibres, *arms], axis=1)
+        return np.concatenate([soft, curved, axes, fibres, yielding, *arms], axis=1)
+
+    def shifted(self, member: str) -> bool:
+        """Whether forces bend a member."""
+        return self.model.scene.members[member].shifted(self.model.scene.sections)
 
     def width(self, member: str) -> int:
         """How many numbers :meth:`rest` has of the section at each place of a member."""
-        return 33 if self.model.scene.members[member].shifted(self.model.scene.sections) else 24
+        return 42 if self.shifted(member) else 33
 
     def _stiffness(self, member: str) -> Array:
         """Largest stiffness of the first model at the places of a member, (places,), N m2."""
@@ -290,26 +307,30 @@ class Results:
         """Lengths (elements,) of the elements of a member, dimensionless."""
         return np.asarray(values_of(self.model.beams.weight[self.model.elements_of(member)])).sum(axis=1)
 
-    def bent(self, member: str, moment: ca.MX, force: ca.MX, axes: Callable[[ca.MX], ca.MX], sections: ca.MX) -> ca.MX:
-        """Change of the curvature about the axes of the sections, (3, places), 1/m.
+    def about(self, moment: ca.MX, force: ca.MX, axes: Callable[[ca.MX], ca.MX], sections: ca.MX) -> ca.MX:
+        """What bends sections, about their axes, with what forces do by their arms, (3, places), N m.
 
         Parameters
         ----------
         moment, force : (3, places), N m and N, fixed axes
         axes : function that rotates vectors (3, places) with the sections
-        sections : (24 or 33, places), their data as of :meth:`rest`
+        sections : (33 or 42, places), their data as of :meth:`rest`
         """
         turned = [axes(sections[12 + 3 * k : 15 + 3 * k, :]) for k in range(3)]
         about = [ca.sum1(axis * moment) for axis in turned]
-        if sections.shape[0] > 24:
+        if sections.shape[0] > 33:
             along = [ca.sum1(axis * force) for axis in turned]
             about = [
-                own + sum((sections[24 + 3 * i + k, :] * along[i] for i in range(3)), ca.MX(0))
+                own + sum((sections[33 + 3 * i + k, :] * along[i] for i in range(3)), ca.MX(0))
                 for k, own in enumerate(about)
             ]
+        return ca.vertcat(*about)
+
+    def bent(self, member: str, about: ca.MX, sections: ca.MX) -> ca.MX:
+        """Change of the curvature about the axes of the sections, (3, places), 1/m, by moments about them, N m."""
         inverse = ca.DM(1.0 / self._stiffness(member)).T
         return ca.vertcat(
-            *(sum((sections[3 * k + j, :] * about[j] for j in range(3)), ca.MX(0)) * inverse for k in range(3))
+            *(sum((sections[3 * k + j, :] * about[j, :] for j in range(3)), ca.MX(0)) * inverse for k in range(3))
         )
 
     def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None, *, short: bool = False) -> ca.MX:
@@ -318,7 +339,12 @@ class Results:
         ``speeds`` (axes, places) are velocities of a motion; ``short`` gives expressions with short derivatives.
         """
         outputs = _Outputs(self, program, rest, speeds, program.forces if short else program.stationarity)
-        return ca.vertcat(*(ca.densify(ca.vec(outputs.value(result.asked).T)) for result in self.results))
+        found = ca.vertcat(*(ca.densify(ca.vec(outputs.value(result.asked).T)) for result in self.results))
+        # Where a magnet is beyond the table of a field there are no answers.
+        beyond = outputs.beyond()
+        return (
+            found if beyond is None else found + ca.stop_diff(ca.if_else(beyond > tolerances.WRITTEN, np.nan, 0.0), 1)
+        )
 
 
 class _Outputs:
@@ -339,16 +365,27 @@ class _Outputs:
         along = [len(x) for x in results.every.values()]
         curved = [results.width(name) * len(results.every[name]) for name in results.curved]
         strung = [results.strung_data(model, name).shape for name in results.strung]
-        bounds = np.cumsum([0, 3 * count, *(3 * n for n in along), *curved, *(a * b for a, b in strung)]).tolist()
-        nodes, *members = ca.vertsplit(rest, bounds)
+        lawful = [law_data(model.scene, name, np.array(results.every[name])).shape for name in results.lawful]
+        tables = [3 * count, *(3 * n for n in along), *curved, *(a * b for a, b in (*strung, *lawful))]
+        nodes, *members = ca.vertsplit(rest, np.cumsum([0, *tables]).tolist())
         sections = members[len(along) : len(along) + len(curved)]
-        pairs = zip(results.strung, strung, members[len(along) + len(curved) :], strict=True)
-        self._tendons = {name: ca.reshape(x, shape[1], shape[0]) for name, shape, x in pairs}
+        pairs = zip((*strung, *lawful), members[len(along) + len(curved) :], strict=True)
+        others = [ca.reshape(x, shape[1], shape[0]) for shape, x in pairs]
+        self._tendons = dict(zip(results.strung, others, strict=False))
+        self._laws = dict(zip(results.lawful, others[len(strung) :], strict=True))
         self._sections = {n: ca.reshape(x, results.width(n), -1) for n, x in zip(results.curved, sections, strict=True)}
         self._rest = ca.reshape(nodes, 3, count)
         self._along = {n: ca.reshape(x, 3, -1) for n, x in zip(results.every, members, strict=False)}
         if expressions.elements:
             self._tangents = expressions.tangents(self._q, places, program.given)
+
+    def beyond(self) -> ca.MX | None:
+        """How far magnets are beyond the tables of fields, over their sizes; None without tables."""
+        scene = self._model.scene
+        if not any(field.table is not None for field in scene.fields.values()):
+            return None
+        own = [(n, i) for name in scene.magnets for n, which in magnet_terms(self._model.terms, name) for i in which]
+        return ca.mmax(ca.vertcat(0.0, *(self._told(n, i, "beyond") for n, i in own)))
 
     def value(self, name: AnswerName) -> ca.MX:
         """A result as a matrix of its rows and columns."""
@@ -483,6 +520,8 @@ class _Outputs:
             return self._rotated(self._rotations(member), key)
         if key == "energy":
             return self._strain_energy(member)
+        if key == "strain":
+            return self._stretch(member)
         if key in BY_FORCES[2:]:
             return self._curvature(member, key)
         return (self._force(member) * scales.force if key == "force" else self._moment(member) * scales.moment).T
@@ -492,26 +531,64 @@ class _Outputs:
             return self._connection("members", member, "energy")
         return ca.sum2(self._program.strains[:, self._model.elements_of(member)]) * self._model.scales.moment
 
-    def _curvature(self, member: str, key: str) -> ca.MX:
-        """Curvature (places, 3), or strain or stress by its change (places,)."""
+    def _stretch(self, member: str) -> ca.MX:
+        """Stretch and shear along the axes of the sections, (places, 3)."""
+        sections, force, axes = self._sections[member], self._force(member), self._expressions.axes
+        function = self._expressions.many(turned_vector(self._model.space), force.shape[1])
+        along = [sections[12 + 3 * k : 15 + 3 * k, :] for k in range(3)]
+        along = [function(self._rotations(member).T, each[:axes, :]) for each in along]
+        along = [ca.sum1(each * force[:axes, :]) for each in along]
+        rows = [sum((sections[24 + 3 * k + j, :] * along[j] for j in range(3)), ca.MX(0)) for k in range(3)]
+        if self._results.shifted(member):
+            change = self._change(member)
+            arms = sections[33:, :]
+            rows = [row + ca.sum1(arms[3 * k : 3 * k + 3, :] * change) for k, row in enumerate(rows)]
+        return ca.vertcat(*rows).T
+
+    def _change(self, member: str) -> ca.MX:
+        """Change of the curvature about the axes of the sections, (3, places), 1/m."""
 
         def turned(vectors: ca.MX) -> ca.MX:
             space = self._model.space
-            if not space and self._results.width(member) == 24:
+            if not space and not self._results.shifted(member):
                 # About z nothing in the plane counts, and z turns to itself.
                 return vectors
             function, q = self._expressions.many(turned_vector(space), vectors.shape[1]), self._rotations(member).T
             return function(q, vectors) if space else ca.vertcat(function(q, vectors[:2, :]), vectors[2, :])
 
-        moment = self._moment(member) * self._model.scales.moment
-        force = self._force(member) * self._model.scales.force if self._results.width(member) > 24 else moment
-        sections, scene = self._sections[member], self._model.scene
-        change = self._results.bent(member, moment, force, turned, sections)
+        moment, sections = self._moment(member) * self._model.scales.moment, self._sections[member]
+        force = self._force(member) * self._model.scales.force if self._results.shifted(member) else moment
+        about = self._results.about(moment, force, turned, sections)
+        return self._by_law(member, about) if member in self._laws else self._results.bent(member, about, sections)
+
+    def _curvature(self, member: str, key: str) -> ca.MX:
+        """Curvature (places, 3), or strain or stress by its change (places,)."""
+        change, sections, scene = self._change(member), self._sections[member], self._model.scene
         if key == "curvature":
             return (sections[9:12, :] / scene.size + self._natural(member) + change).T
         shape = scene.sections[str(scene.members[member].section)].shape
-        strain = self._expressions.many(fibre_strain(shape != "rectangle"), change.shape[1])(change, sections[22:, :])
+        strain = self._expressions.many(fibre_strain(shape != "rectangle"), change.shape[1])(change, sections[22:24, :])
         return (strain * sections[21, :] if key == "bending_stress" else strain).T
+
+    def _by_law(self, member: str, moment: ca.MX) -> ca.MX:
+        """Change of the curvature (3, places), 1/m, at which the law of a section gives moments about its axes."""
+        model, sections, law = self._model, self._sections[member], law_of(self._model.scene, member)
+        assert law is not None
+        spin = self._about(self._spins(member)) / model.scales.length
+        near = ca.vertcat(*(ca.sum1(sections[12 + 3 * k : 15 + 3 * k, :] * spin) for k in range(3)))
+        axes = (0, 1, 2) if model.space else (model.scene.center_lines[member].bending_axis - 1,)
+        return self._expressions.many(bent_by(law.form, axes), moment.shape[1])(moment, near, self._laws[member])
+
+    def _spins(self, member: str) -> ca.MX:
+        """Change of the curvature as elements say, about the fixed axes of the undeformed scene, (turns, places)."""
+        model, at = self._model, self._stations(member)
+        nodes = model.rotations.turns[model.elements_of(member)][at.elements]
+        lengths = np.asarray(self._results.lengths(member))[at.elements]
+        pairs = zip(nodes, at.slopes / lengths[:, None], strict=True)
+        slope = ca.horzcat(*(ca.mtimes(self._q[:, t.tolist()], ca.DM(row)) for t, row in pairs))
+        if not model.space:
+            return slope
+        return self._expressions.many(spin_of(), len(nodes))(self._rotations(member).T, slope)
 
     def _natural(self, member: str) -> ca.MX:
         """Natural twist and curvature, (3, places), 1/m, section axes, that actuations add."""
@@ -570,19 +647,14 @@ class _Outputs:
     def _strung(self, member: str) -> tuple[ca.MX, ca.MX]:
         """Section moment, and force of tendons along a member, at the places, (3, places) each."""
         model, at, moment = self._model, self._stations(member), self._cut(member)
-        part, turns = model.elements_of(member), self._expressions.turns
+        turns, guess = self._expressions.turns, self._spins(member)
         pieces = stretches_of(model.scene, member)
         tensions = ca.vertcat(*(self._tensions(name, piece) for name, piece in pieces)) / model.scales.force
-        nodes = model.rotations.turns[part][at.elements]
-        lengths = np.asarray(self._results.lengths(member))[at.elements]
-        pairs = zip(nodes, at.slopes / lengths[:, None], strict=True)
-        slope = ca.horzcat(*(ca.mtimes(self._q[:, t.tolist()], ca.DM(row)) for t, row in pairs))
-        q, n = self._rotations(member).T, len(nodes)
-        back, guess = moment[3 - turns :, :], slope
+        q, n = self._rotations(member).T, len(at.elements)
+        back = moment[3 - turns :, :]
         if model.space:
             opposite = ca.vertcat(q[0, :], -q[1:, :])
             back = self._expressions.many(turned_vector(True), n)(opposite, moment)
-            guess = self._expressions.many(spin_of(), n)(q, slope)
         function = self._expressions.many(share_of(model.space, len(pieces), NEWTON_STEPS), n)
         natural, strain = self._natural_about(member)[3 - turns :, :], self._strain(member)
         about, along = function(back, guess, natural, strain, self._tendons[member], tensions)
@@ -660,7 +732,7 @@ class _Outputs:
 
     def _magnet(self, name: str, key: str) -> ca.MX:
         """Energy, torque or force that fields give a magnet."""
-        expressions, model, total = self._expressions, self._model, ca.MX.zeros(7)
+        expressions, model, total = self._expressions, self._model, ca.MX.zeros(8)
         given, places = self._program.given, expressions.retained_places(self._y, self._program.given)
         for connection, own in magnet_terms(model.connections, name):
             number, group = connection + 1, model.connections[connection]

@@ -33,6 +33,7 @@ from .sketch import (
     MOTION,
     NATURAL,
     REACTION,
+    TENDON,
     Ink,
     Sketch,
     broken,
@@ -49,7 +50,6 @@ ARROW = 0.12
 """Length of the longest arrow over the size of the picture; sizes below are shares of it, too."""
 SYMBOL = 0.03
 SPRING = "#5A5A5A"
-TENDON = "#8C4A9E"
 TUBE = "#B4BAC3"
 SPIRAL = 0.026
 """Outer radius of the spiral of a rotational spring."""

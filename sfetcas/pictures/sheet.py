@@ -40,6 +40,7 @@ from .sketch import (
     REACTION,
     REST,
     SUPPORT,
+    TENDON,
     Label,
     Look,
     Mark,
@@ -280,6 +281,10 @@ def _legend(sketch: Sketch, looks: Sequence[Look]) -> list[Any]:
             handles.append(line)
     if "actuation" in drawn:
         handles.append(Line2D([], [], color=NATURAL[0], linewidth=2.2, label="natural curvature"))
+    if "tendon" in drawn:
+        kinds = {"chamber" if tendon.pressure is not None else "tendon" for tendon in sketch.scene.tendons.values()}
+        text = " or ".join(sorted(kinds, reverse=True))
+        handles.append(Line2D([], [], color=TENDON, linewidth=1.4, label=text))
     if "contact" in drawn:
         handles.append(Patch(facecolor="white", edgecolor=SUPPORT, hatch="////", linewidth=0.7, label="obstacle"))
     return handles

@@ -29,6 +29,7 @@ __all__ = [
     "REACTION",
     "REST",
     "SUPPORT",
+    "TENDON",
     "Course",
     "Ink",
     "Label",
@@ -55,6 +56,7 @@ __all__ = [
 LOAD, REACTION, MOTION = "#D55E00", "#0072B2", "#8F3B76"
 MAGNET, FIELD = "#B22222", "#007A5E"
 NATURAL = ("#C44E52", "#4C72B0")
+TENDON = "#8C4A9E"
 """Colours of natural curvature to the left or in space, and to the right."""
 REST, SUPPORT = "#8C8C8C", "#333333"
 BEHIND = 1.5

@@ -128,11 +128,13 @@ class Curve:
         self._rotation_unknowns, self._proximal = rotation_unknowns, tolerances.PROXIMAL * prepared.weight
         self._driven = any(np.any(group.turn) for group in self.model.groups.values())
         self._linear = set(self.model.groups) == {None}
-        self._has_superelements = any(member.type == "small" for member in prepared.model.scene.members.values())
+        self._limited = prepared.model.scene.limited
 
     def too_large(self, standing: Standing) -> str:
-        """Message naming a small member that bends beyond the range of its linear model; empty if none does."""
-        return standing.fields.too_large() if self._has_superelements else ""
+        """Message naming a small member that bends beyond the range of its linear model, or a magnet beyond that of a
+        table; empty if none does.
+        """
+        return standing.fields.too_large() if self._limited else ""
 
     def within(self, piece: tuple[float, float]) -> Curve:
         """A copy of the curve with another ``piece``, the range of factors without a knot of a history."""

@@ -106,6 +106,10 @@ class ControlledSystem:
             if path[0] not in COMMANDED or (field is not None and (field.type == "dipole" or "value" not in path)):
                 accepted = "a component of the value of a load, an actuation or a field, a number of a tendon, or"
                 raise SceneError(f"found {name!r}, accepted: {accepted} histories.NAME of one", ("controls",))
+        for name, field in scene.fields.items():
+            if field.table is not None and scene.magnets:
+                message = "found a table, with which no control knows where it ends, accepted: another type of field"
+                raise SceneError(message, ("fields", name))
         for name, tendon in scene.tendons.items():
             controlled = any(one.startswith(f"tendons.{name}.") for one in names) or tendon.history is not None
             if controlled and tendon.rubs:
