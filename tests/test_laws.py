@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 from test_codegen import built, needs_compiler, said
 
 import sfetcas
-from sfetcas import CrossSection, Scene, SceneError
+from sfetcas import CrossSection, Scene, SceneError, SolveError, Status
+from sfetcas.equilibria.ways import Ways
 from sfetcas.mathematics.forms import Form
 from sfetcas.mathematics.potentials import derivatives_of
 from sfetcas.mechanics.equations import Equations
@@ -725,7 +726,7 @@ def test_ribbon_of_sadowsky_is_convex_and_has_no_corner():
         np.testing.assert_allclose(*sides, rtol=1e-7, atol=1e-7)
 
 
-@pytest.mark.parametrize("t", [3.0, 6.0, 9.9])
+@pytest.mark.parametrize("t", [6.0, 9.9])
 def test_ribbon_of_sadowsky_is_a_helix(t):
     """Curvature k and twist t all along, under the force and the moment at its end that such a helix needs.
 
@@ -744,13 +745,23 @@ def test_ribbon_of_sadowsky_is_a_helix(t):
     np.testing.assert_allclose(found.along("beam", [0.1, 0.7])["curvature"], [w, w], atol=1e-5)
 
 
+def test_where_no_equilibrium_is_found_the_law_is_named():
+    one = scene(section=sadowsky(), load=force([0.0, 0.0, -0.1]), dimension="space")
+    pilot = sfetcas.Prepared(sfetcas.assemble(one, sfetcas.uniform_mesh(one, 1, 2)))
+    for status, named in ((Status.ITERATIONS, True), (Status.INFEASIBLE, False)):
+        error = Ways.named(None, pilot, SolveError(status, "it failed"))
+        assert error.detail.startswith("it failed")
+        assert ("where a ribbon twists more than it bends, accepted there: 'audoly-neukirch'" in error.detail) is named
+
+
 def test_ribbons_of_vanishing_thickness_are_that_of_sadowsky():
     """Of one plate stiffness: what the thickness changes falls with its root, and two of them tell the limit."""
 
     def end(law, thick):
         section = {**RIBBON, "height": thick, "E": RIBBON["E"] * (RIBBON["height"] / thick) ** 3, "law": {"type": law}}
         one = scene(section=section, load=force([0.0, 0.03, -0.1]), dimension="space")
-        return sfetcas.solve(one.replace({"nodes.B.position": [0.1, 0, 0], "members.beam.b2": [0, 0, 1]})).last
+        one = one.replace({"nodes.B.position": [0.1, 0, 0], "members.beam.b2": [0, 0, 1]})
+        return sfetcas.solve(one, element="SFET4", elements=4).last
 
     found, thick, thin = end("sadowsky", 4e-4), *(end("audoly-neukirch", h).position("B") for h in (4e-5, 4e-7))
     assert found.certificate.stable

@@ -103,6 +103,7 @@ def every_kind():
     }
     stretching = {"s": {**plane["sections"]["s"], "stretch": True}}
     tubed = {"s": {**plane["sections"]["s"], "nu": 0.3}}
+    plastic = {"s": {"EI3": 1.0, "law": {"type": "elastic-plastic", "moment": 2.0, "ratio": 0.1}}}
     force = {"f": {"type": "force", "node": "B", "value": [0, -1]}}
     stopped = {"k": {"node": "A", "stiffness": 2.0, "stop": [-0.1, 0.1]}}
     pulled = {"k": {"type": "translational", "node": "B", "anchor": [1, 1], "stiffness": 1.0}}
@@ -113,6 +114,7 @@ def every_kind():
         {**plane, "springs": stopped, "loads": force},
         {**clamped, "sections": stretching, "springs": pulled, "motions": moved},
         {**clamped, "contacts": floor, "loads": force},
+        {**clamped, "sections": plastic, "loads": force},
         {**clamped, "tendons": {"t": {"way": [{"member": "m", "offset": 0.1}], "pull": 0.01}}},
         {**clamped, "tendons": {"t": {"way": [{"member": "m", "offset": 0.1}], "tension": 0.1, "friction": 0.2}}},
         {**clamped, "sections": tubed, "tubes": {"t": {"members": "m", "section": "s", "length": 0.5}}, "loads": force},

@@ -1,5 +1,7 @@
 """Laws of stretch: bars in closed form, heavy cords by SciPy, oscillators, and every analysis."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_bvp, solve_ivp
@@ -9,7 +11,6 @@ from test_codegen import built, needs_compiler, said
 
 import sfetcas
 from sfetcas import Scene, SceneError
-from sfetcas.codegen.timestep import time_step
 
 pytestmark = pytest.mark.usefixtures("interpreted")
 
@@ -59,10 +60,10 @@ def test_bar_has_the_strain_of_its_law(law, dimension, force, solver):
     assert found.position("B")[0] == pytest.approx(1.0 + strain, abs=1e-10)
     np.testing.assert_allclose(found.along("m", [0.0, 0.4])["strain"][:, 0], strain, atol=1e-10)
     # The work of a force that grows as the law says.
-    points, weights = np.polynomial.legendre.leggauss(400)
+    points, weights = np.polynomial.legendre.leggauss(60)
     energy = 0.5 * strain * (weights @ [force_of(law, 0.5 * strain * (1.0 + x)) for x in points])
     # Kinks lie between the points of the sum.
-    assert found.table("members", "m")["energy"] == pytest.approx(energy, rel=1e-4)
+    assert found.table("members", "m")["energy"] == pytest.approx(energy, rel=1e-3)
     assert found.certificate.stable
 
 
@@ -172,30 +173,14 @@ def test_mass_on_a_cord(integrator):
     assert np.ptp(found.energies()) < 2e-5
 
 
-def test_optimal_control():
-    scene = bar(TABLE).replace({"nodes.B.mass": 1.0, "sections.s.rhoA": 0.01, "members.m.element": "SFET2"})
-    scene = scene.replace({"members.m.elements": 1})
-    problem = sfetcas.OptimalControl(scene, {"loads.f.value.0": (-9, 9)}, time=2.0, intervals=8, order=1)
-    problem.minimise(problem.integral(problem.control("loads.f.value.0") ** 2))
-    problem.subject_to(problem.at_tf(problem.answer("nodes.B.position")[0]) == 1.3, name="there")
-    found = problem.solve()
-    assert found.check.difference < 1e-2
-
-
 @needs_compiler
 def test_in_c(tmp_path):
-    """Equilibria and time steps as programs in C, to the last bit."""
+    """The program in C agrees with the functions of CasADi to the last digits."""
     scene = bar(TABLE).replace({"members.m.elements": 1, "members.m.element": "SFET3"})
     at = "sections.s.stretch_law.force.4"
     sfetcas.export(scene, tmp_path / "c", name="c", arguments=[at], results=["nodes.B.position"])
-    assert "agree" in said(built(tmp_path / "c", "c"))
-    analysis = {"type": "dynamic", "end": 0.2, "step": 0.01, "output": 0.2, "integrator": "radau-2"}
-    moving = scene.replace({"analysis": analysis})
-    made = time_step(moving, "motion", arguments=[at], results=["nodes.B.position"])
-    state = made.begin
-    for _ in range(20):
-        state = made.step(state, 0.01)
-    np.testing.assert_allclose(made.outputs(state), sfetcas.solve(moving).last.position("B"), atol=1e-9)
+    words = said(built(tmp_path / "c", "c"))
+    assert re.match(r"(\d+) of \1 cases agree, \1 of them to the last bit", words), words
 
 
 # -- wrong input --------------------------------------------------------------------------------------

@@ -35,6 +35,8 @@ TABLES = {
     "StressStrain": ("Laws: stress over strain", '`law = { type = "stress-strain", ... }` of a section'),
     "Ribbon": ("Laws: ribbon", '`law = { type = "audoly-neukirch" }` of a section'),
     "Sadowsky": ("Laws: ribbon of Sadowsky", '`law = { type = "sadowsky" }` of a section'),
+    "ElasticPlastic": ("Laws: elastic-plastic", '`law = { type = "elastic-plastic", ... }` of a section'),
+    "Superelastic": ("Laws: superelastic", '`law = { type = "superelastic", ... }` of a section'),
     "Potential": ("Laws: potential", "`law = Potential(potential=...)` of a section, in Python"),
     "StretchBilinear": ("Laws of stretch: bilinear", '`stretch_law = { type = "bilinear", ... }` of a section'),
     "StretchTable": ("Laws of stretch: table", '`stretch_law = { type = "table", ... }` of a section'),

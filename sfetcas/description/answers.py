@@ -121,7 +121,7 @@ def outlined(scene: Any, record: Any) -> bool:
     if record.type != "flexible":
         return False
     section = scene.sections[str(record.section)]
-    return section.shape is not None and section.law is None and section.coupling is None
+    return section.shape is not None and section.law is section.coupling is section.stretch_law is None
 
 
 TABLE = """

@@ -61,6 +61,9 @@ class SectionLaw(Record):
     remembers: ClassVar[bool] = False
     """Whether its moments depend on the curvatures of the steps before."""
 
+    hint: ClassVar[str] = ""
+    """What it is known for where no equilibrium is found; empty for most."""
+
     @property
     def needs(self) -> tuple[str, ...]:
         """Stiffnesses of the section with which it begins."""
@@ -602,6 +605,10 @@ class Sadowsky(SectionLaw):
     """
 
     shaped: ClassVar[str] = "rectangle"
+    hint: ClassVar[str] = (
+        "the law 'sadowsky' has no stiffness against bending where a ribbon twists more than it bends, accepted there: "
+        "'audoly-neukirch'"
+    )
 
     type: Literal["sadowsky"] = "sadowsky"
 
@@ -791,18 +798,18 @@ class Superelastic(_Remembering):
         Axis of bending: ``b2``, ``b3``, or with ``stress`` ``both``.
     moment : N m
         Moment at which the plateau on loading begins, of either sign; or ``stress``.
-    curvature : 1/m
-        With ``moment``: change of the curvature at which that plateau ends.
     stress : N/m²
         With a shape: stress at which the plateau of its fibres begins.  A rectangle needs an axis, a circle or a tube
         ``both``.
+    ratio : 1
+        Stiffness on the plateaus over that before, above 0 and below 1.
+    curvature : 1/m
+        With ``moment``: change of the curvature at which the plateau on loading ends.
     strain : 1
         With ``stress``: strain at which that plateau ends.
     unloading : N m, N/m²
         Moment, or with ``stress`` stress, at which the plateau on unloading ends, above 0 and below that at which the
         one on loading begins.
-    ratio : 1
-        Stiffness on the plateaus over that before, above 0 and below 1.
     """
 
     type: Literal["superelastic"] = "superelastic"

@@ -11,6 +11,10 @@ from ..errors import SceneError
 
 __all__ = ["check_memory", "refuse_memory", "remembering_section"]
 
+TYPES = ("static", "dynamic")
+TYPES_IN_WORDS = " or ".join(map(repr, TYPES))
+"""Types of the analysis whose steps come one after the other."""
+
 TURNS = 1e-6
 """Share of the largest factor of a history by which it may go back between two steps: rounding of smooth ones."""
 
@@ -56,8 +60,8 @@ def check_memory(scene: Any) -> None:
         return
     analysis, law = scene.analysis, scene.sections[section].law.type
     whose = f"of section {section!r}, whose moments depend on the steps before"
-    if analysis.type not in ("static", "dynamic"):
-        message = f"found {analysis.type!r}, accepted: 'static' or 'dynamic' with the law {law!r} {whose}"
+    if analysis.type not in TYPES:
+        message = f"found {analysis.type!r}, accepted: {TYPES_IN_WORDS} with the law {law!r} {whose}"
         raise SceneError(message, ("analysis", "type"))
     if analysis.equilibria == "all":
         message = f"found 'all', accepted: 'one' with the law {law!r} {whose}"

@@ -500,6 +500,9 @@ def _check_tendons(scene: Scene) -> None:
             if section is not None and not way.holes and scene.sections[section].stretch_law is not None:
                 found = f"found the member {way.member!r}, whose section has a law of stretch"
                 raise SceneError(f"{found}, accepted: discs, or a member without one", ("tendons", name))
+            if way.member is not None and not way.holes and scene.members[way.member].branches(scene.sections):
+                found = f"found the member {way.member!r}, whose section relaxes"
+                raise SceneError(f"{found}, accepted: discs, or a member that does not", ("tendons", name))
         if tendon.may_be_slack and (scene.analysis.type != "static" or scene.analysis.equilibria == "all"):
             what = "'all' equilibria" if scene.analysis.type == "static" else f"the analysis {scene.analysis.type!r}"
             message = f"found a length that is given with {what}, in which no tendon becomes slack, accepted: pushes ="

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -41,6 +41,8 @@ class Memory:
         Offsets of ``y`` and ``x``, moved along with a structure that flies far, so that no digits are lost.
     last : Taken or None
         The step before; None after a restart.
+    remembered : ndarray
+        What members remember, see :class:`~sfetcas.mechanics.memory.Remembering`.
     """
 
     t: float
@@ -52,6 +54,7 @@ class Memory:
     unwrapped: Array
     origin: tuple[Array, Array] = (np.zeros(1), np.zeros(1))
     last: Taken | None = None
+    remembered: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def position(self) -> Array:
@@ -141,8 +144,9 @@ class Stepper:
         turns = np.zeros((stages, n.rotations, system.turns)) if last is None else last.turns
         shifts = np.zeros((stages, n.y)) if last is None else last.shifts
         ratio = np.array([0.0 if last is None else h / last.h])
+        counted = np.concatenate([memory.unwrapped, memory.remembered[: system.memory.size]])
         given = (memory.q, memory.y, memory.lam, turns, shifts, memory.x, memory.rates)
-        for i, values in enumerate((*given, ratio, np.array([h]), factors, memory.unwrapped)):
+        for i, values in enumerate((*given, ratio, np.array([h]), factors, counted)):
             if values.size:
                 self._batch.set(i, values)
         # Stopped by a matrix without an inverse, a step leaves no numbers.
@@ -151,8 +155,12 @@ class Stepper:
         q, y, lam, turns, shifts, x, rates, size, iterations, gap = (part.ravel().copy() for part in self._batch())
         self.count += 1
         q, lam, x = q.reshape(n.rotations, -1), lam.reshape(stages, n.lam), x.reshape(stages, n.x)
-        unwrapped = system.model.unwrapping.angles(q, memory.unwrapped) if n.unwrapped else memory.unwrapped
-        after = Memory(memory.t + h, q, y, lam[-1], x[-1], rates.reshape(method.kept, n.x), unwrapped, memory.origin)
+        unwrapping, unwrapped, remembered = system.model.unwrapping, memory.unwrapped, memory.remembered
+        unwrapped = unwrapping.angles(q, unwrapped) if unwrapping.count else unwrapped
+        # All stages of a step know what was remembered at its begin; its end is remembered by the next one.
+        remembered = system.memory.after(q, remembered) if system.memory.size else remembered
+        kept = rates.reshape(method.kept, n.x)
+        after = Memory(memory.t + h, q, y, lam[-1], x[-1], kept, unwrapped, memory.origin, remembered=remembered)
         change = float(size[0]) if np.isfinite(x).all() else np.inf
         parts = turns.reshape(stages, n.rotations, -1), shifts.reshape(stages, n.y), x, lam
         taken = Taken(memory, after, h, method.places, *parts, change, int(np.nan_to_num(iterations[0])), float(gap[0]))

@@ -143,7 +143,8 @@ class Stages(Integrator):
         stepper, method, state = self._stepper, self._stepper.method, begun.state
         rates = np.zeros((method.kept, len(begun.x)))
         rates[0] = begun.v
-        memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.unwrapped)
+        begin = self.system.memory.begun
+        memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.unwrapped, remembered=begin)
         self._sampler, self.record = Sampler(course.times, method.stages), StepRecord(method.stages)
         steps = integrate(
             stepper,

@@ -22,6 +22,7 @@ from ..mathematics.threads import single_threaded
 from ..mechanics.balance import three
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
+from ..mechanics.memory import Remembering
 from ..mechanics.model import Model
 from .projecting import factor_closings
 
@@ -44,32 +45,37 @@ class Mover:
     def __init__(self, equations: Equations, inertia: Inertia, time: float, factors: Callable[[float], Array]) -> None:
         self.equations, self.inertia, self.time, self.factors = equations, inertia, time, factors
         self.model: Model = equations.model
+        self.memory = Remembering(self.model)
 
     def instant(self, sample: Sample) -> MotionState:
         """The state by name of a dimensionless sample; multipliers balance all forces in least squares."""
         model, equations = self.model, self.equations
+        if self.memory.size:
+            model = self.memory.model_with(sample.remembered)
+            equations = equations.remembering(model)
         loading = self.inertia.system.loading(self.factors(sample.t))
         free = State(sample.q, sample.y, np.zeros(len(model.row_names)), sample.unwrapped)
         point = equations.at(free, loading)
         forces = self.inertia.forces(sample.v, sample.a)
         balanced = self.inertia.loading(equations, free, equations.effective(free, loading), forces)
-        state = State(sample.q, sample.y, self._multipliers(free, balanced), sample.unwrapped)
+        state = State(sample.q, sample.y, self._multipliers(equations, free, balanced), sample.unwrapped)
+        fields = Fields(equations, state, balanced)
         kinetic = self.inertia.kinetic(sample.v)
         return MotionState(
             factor=sample.t * self.time,
             model=model,
             state=state,
             loading=balanced,
-            fields=Fields(equations, state, balanced),
+            fields=fields,
             time=sample.t * self.time,
             sample=sample,
-            energies=(kinetic, point.strain, point.potential - point.strain),
+            energies=(kinetic, point.strain, point.potential - point.strain - fields.spent / model.scales.moment),
             mover=self,
         )
 
-    def _multipliers(self, free: State, balanced: Any) -> Array:
+    @staticmethod
+    def _multipliers(equations: Equations, free: State, balanced: Any) -> Array:
         """Internal forces that leave the least out of balance."""
-        equations = self.equations
         point, n = equations.at(free, balanced), equations.unknowns
         if not equations.rows:
             return np.zeros(0)
@@ -144,7 +150,8 @@ class MotionState(Configuration):
         ``loads`` is minus the present forces times displacements, so that the sum also changes while loads change.
         """
         kinetic, elastic, loads = (part * self.model.scales.moment for part in self.energies)
-        return {"kinetic": kinetic, "elastic": elastic, "loads": loads, "total": kinetic + elastic + loads}
+        lost = {"dissipated": sum(self.fields.dissipated.values())} if self.fields.dissipated else {}
+        return {"kinetic": kinetic, "elastic": elastic, **lost, "loads": loads, "total": kinetic + elastic + loads}
 
     @functools.cached_property
     def momentum(self) -> dict[str, Array]:

@@ -9,7 +9,7 @@ are interpolated instead.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,6 +44,8 @@ class Sample:
         Angular velocities about the fixed axes.
     unwrapped : ndarray
         Angles that count turns.
+    remembered : ndarray
+        What members remember at the begin of the step in which it is.
     """
 
     t: float
@@ -54,6 +56,7 @@ class Sample:
     a: Array
     spin: Array
     unwrapped: Array
+    remembered: Array = field(default_factory=lambda: np.zeros(0))
 
 
 class Sampler:
@@ -160,7 +163,8 @@ def _alone(memory: Memory) -> Memory:
 def _bytes(taken: Taken) -> int:
     """Size of what is kept of a step, nearly."""
     after = taken.after
-    return sum(part.nbytes for part in (taken.turns, taken.shifts, taken.x, after.q, after.y, after.x, after.rates))
+    more = after.rates, after.remembered
+    return sum(part.nbytes for part in (taken.turns, taken.shifts, taken.x, after.q, after.y, after.x, *more))
 
 
 def _within(steps: Sequence[Taken], stages: int, t: float, *, whole: bool = False) -> Sample:
@@ -222,7 +226,8 @@ def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -
     near = np.delete(np.arange(len(at)), int(np.abs(at - here).argmax()))
     doubt = np.abs(a - _rates(at[near], here, quantities[near])[1]).max(initial=0.0) if len(at) > 2 else 0.0
     position = middle + (row @ quantities)[0]
-    sample = Sample(t, q, (row @ np.array(y))[0], position, v / h, a / h**2, spin, own.after.unwrapped)
+    given = own.after.unwrapped, begin.remembered
+    sample = Sample(t, q, (row @ np.array(y))[0], position, v / h, a / h**2, spin, *given)
     return sample, float(doubt) / h**2
 
 
@@ -242,7 +247,7 @@ def between(samples: Sequence[Sample], t: float) -> Sample:
         return np.tensordot(row, np.array([getattr(sample, part) for sample in samples]), 1)
 
     q = _turned(near.q, np.einsum("n,nra->ra", row, turns))
-    return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), mean("spin"), near.unwrapped)
+    return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), mean("spin"), near.unwrapped, near.remembered)
 
 
 def _turned(q: Array, turn: Array) -> Array:

@@ -438,7 +438,7 @@ def _keeps_energy(model: Model) -> bool:
     scene = model.scene
     given = bool(scene.histories_used) or bool(scene.motions)
     given = given or not model.has_potential
-    taken = scene.relaxes or any(part.damping or part.drag for part in scene.sections.values())
+    taken = scene.relaxes or scene.remembers or any(part.damping or part.drag for part in scene.sections.values())
     taken = taken or any(spring.damping for spring in scene.springs.values())
     return not (given or taken or scene.rotating is not None or any(node.drag for node in scene.nodes.values()))
 
@@ -461,11 +461,11 @@ class _Beginning:
         parts = [system.static_matrix(stage), system.coupling_matrix(stage, 0.0, 1.0)]
         parts += [system.coupling_matrix(stage, 1.0, 0.0), stage.residual]
         self._function = ca.Function("begin", [q, y, lam, factors, unwrapped], parts)
-        self._equations = system.equations
+        self._equations, self._system = system.equations, system
 
     def __call__(self, state: State, lam: Array, factors: Array) -> tuple[Array, Array, Array, Array]:
         """Stiffness with closings, masses and dampers, (total, total) each, and the sum of all forces (total,)."""
-        given = (state.q.T, state.y, lam, factors, state.unwrapped)
+        given = (state.q.T, state.y, lam, factors, self._system.counted(state))
         stiffness, mass, damping, forces = (np.array(part) for part in self._function.call([ca.DM(x) for x in given]))
         return stiffness, mass, damping, forces.ravel()
 

@@ -25,6 +25,7 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.expressions import Expressions, Given, moved_by
 from ..mechanics.loading import Loading
 from ..mechanics.masses import Masses, Observables
+from ..mechanics.memory import Remembering
 from ..mechanics.singles import arms_product, weighted_product
 from ..mechanics.terms import rows_of
 
@@ -61,7 +62,8 @@ class System(Expressions):
         super().__init__(equations, kernels, calls)
         if len(self.model.positions.E.value):
             raise ValueError("motion needs the nodal assembly on a mesh with a place at every cut")
-        self.masses = masses
+        self.masses, self.memory = masses, Remembering(self.model)
+        self._memory = {number: (group, part) for number, group, part in self.memory.parts()}
         self.observed = [self.tables.sides_of(group) for group in masses.observables]
         self._place()
         self._weigh()
@@ -126,7 +128,24 @@ class System(Expressions):
         sizes = [group.kind.sizes[2] * len(group.data) for group in masses.observables]
         bounds = np.cumsum([self.linear, *sizes]).tolist()
         self.ranges = list(zip(bounds, bounds[1:], strict=False))
-        self.layout = Layout(**vars(self.layout), x=bounds[-1])
+        # What members remember is given with the angles that count turns, and changes as seldom.
+        given = self.layout.unwrapped + self.memory.size
+        self.layout = Layout(**{**vars(self.layout), "unwrapped": given}, x=bounds[-1])
+
+    def data(self, number: int, given: Given, unwrapped: ca.MX) -> ca.MX:
+        """As of :meth:`.SymbolicTerms.data`, with what members remember from behind the angles in ``unwrapped``."""
+        data, angles = super().data(number, given, unwrapped), self.layout.unwrapped - self.memory.size
+        if number - 1 not in self._memory:
+            return data
+        group, part = self._memory[number - 1]
+        columns = group.kind.memory_columns.tolist()
+        own = unwrapped[angles + part.start : angles + part.stop]
+        data[columns, :] = ca.reshape(own, len(columns), len(group.data))
+        return data
+
+    def counted(self, state: State) -> Array:
+        """The angles that count turns in a state, and what members remember at the begin."""
+        return np.concatenate([state.unwrapped, self.memory.begun[: self.memory.size]])
 
     @functools.cached_property
     def _rates(self) -> ca.Function:
@@ -148,7 +167,7 @@ class System(Expressions):
     def rates(self, state: State, factors: Array, step: Array) -> tuple[Array, Array]:
         """Quantities (quantities,) at a state, and their rates for the rates ``step`` (unknowns,) of the unknowns."""
         full = np.concatenate([step, np.zeros(self.equations.rows)])
-        x, v = self.interpreted._rates(state.q.T, state.y, factors, state.unwrapped, full)
+        x, v = self.interpreted._rates(state.q.T, state.y, factors, self.counted(state), full)
         return np.array(x).ravel(), np.array(v).ravel()
 
     @functools.cached_property

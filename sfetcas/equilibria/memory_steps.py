@@ -27,7 +27,7 @@ from ..solvers.unrestrained import refuse_unrestrained
 from .meshing import EquilibriumResult, Meshing
 from .refinement import DRIFT, LEVELS, MOST_ELEMENTS, STALLS, Refinement
 from .solution import Equilibrium
-from .ways import Ways
+from .ways import NO_ENERGY, Ways
 
 __all__ = ["MemorySteps"]
 
@@ -112,7 +112,7 @@ class MemorySteps:
             Nothing holds the scene; a step has no equilibrium that could be found, :attr:`failed` says which.
         """
         now = self._sequence(self.meshes.pilot_mesh, ())
-        if self.meshes.pilot_mesh is not self.meshes.target and (self.meshes.prescribed or self.meshes.fixed):
+        if self.meshes.pilot_mesh is not self.meshes.target:
             now = self._sequence(self.meshes.target, now)
         if self.meshes.prescribed:
             finer = self._sequence(now[0].solved.model.mesh.refined(), now)
@@ -216,9 +216,13 @@ class MemorySteps:
                 raise SolveError(Status.FAILED, "the loads could not be followed from the step before", state)
             solved, iterations = prepared.minimise(loading, state)
             found = EquilibriumResult(solved, solved.stability, (NOT_FOLLOWED,), iterations, way=("minimum",))
-        unstable = found.stability.negative > 0 and prepared.model.conservative
+        notes = found.notes
+        if not prepared.model.conservative:
+            notes += (NO_ENERGY,)
+        elif found.stability.negative > 0:
+            notes += (UNSTABLE,)
         # What follows remembers this state: no finer mesh may leave it for another.
-        return replace(found, kept=True, notes=(*found.notes, UNSTABLE) if unstable else found.notes)
+        return replace(found, kept=True, notes=notes)
 
     def _answer(self, found: EquilibriumResult, error: float, halved: float | None) -> Equilibrium:
         return self.refinement.answer(found, error, halved)

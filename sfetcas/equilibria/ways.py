@@ -11,6 +11,7 @@ import numpy as np
 from ..description.records import counted
 from ..errors import SolveError, Status
 from ..mechanics.equations import State
+from ..mechanics.laws import law_of
 from ..mechanics.loading import Loading
 from ..mechanics.magnetism import where_fields_end
 from ..solvers.continuation import CONTRACTION, JUMPED, between, follow, near_factor
@@ -219,7 +220,7 @@ class Ways:
         return replace(grown, iterations=alone.iterations, notes=notes)
 
     def named(self, pilot: Prepared, error: SolveError) -> SolveError:
-        """The error with the names of unrestrained mechanisms, and of members without slack, where there are any."""
+        """The error with the names of unrestrained mechanisms and of members without slack, and hints of laws."""
         try:
             free, taut = pilot.diagnosis, pilot.lacks_slack
         except np.linalg.LinAlgError:
@@ -230,6 +231,9 @@ class Ways:
             rows = ", ".join(dict.fromkeys(free.redundant))
             details.append(f"{TAUT}: {rows}")
         details += [] if error.status is Status.OUTSIDE else where_fields_end(self.scene)
+        if error.status in (Status.FAILED, Status.ITERATIONS):
+            laws = (law_of(pilot.model.scene, name) for name in pilot.model.members)
+            details += dict.fromkeys(law.hint for law in laws if law is not None and law.hint)
         return SolveError(error.status, "; ".join(details), error.last)
 
     # -- single ways ----------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ certificate and continuation use this one.
 
 from __future__ import annotations
 
+import copy
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -140,6 +141,17 @@ class Equations:
         self.noise[free] = self.noise[free].max(axis=1, keepdims=True)
         self.noise[self._retained] = self.noise[self._retained].max(axis=1, keepdims=True)
         self.noise[self.unknowns :] = 1.0
+
+    def remembering(self, model: Model) -> Equations:
+        """The same equations of a model that differs by what its members remember alone."""
+        found = copy.copy(self)
+        found.model, found.tables = model, copy.copy(self.tables)
+        found.tables.model = model
+        pairs = enumerate(zip(self._terms, model.terms, strict=True))
+        found._terms = [
+            _Terms(found.tables, i, "interpreted", 1.0) if group.kind.memory else terms for i, (terms, group) in pairs
+        ]
+        return found
 
     @functools.cached_property
     def elastic_displacements(self) -> Index:

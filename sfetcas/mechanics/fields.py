@@ -283,15 +283,19 @@ class Fields:
     def bending(self, member: str, x: Array, curvature: Array) -> tuple[Array, Array]:
         """Largest fibre strain and stress (Pa) by bending, (n,) each, of a member whose section has a shape.
 
-        The curvature that is natural strains no fibre.
+        The curvature that is natural strains no fibre; the stress of a section that relaxes is that of its moment.
         ``curvature`` (n, 3) 1/m at fractions x (n,) of the length, as of :meth:`along`.
         """
         scene = self.model.scene
         section = scene.sections[str(scene.members[member].section)]
         change = curvature - scene.center_lines[member].curvatures(x) - self.natural(member, x)
-        fibres = section.fibres(x)
-        strain = fibre_strain(section.shape != "rectangle")(change.T, fibres[:, 1:].T).full().ravel()
-        return strain, fibres[:, 0] * strain
+        fibres, largest = section.fibres(x), fibre_strain(section.shape != "rectangle")
+        strain = largest(change.T, fibres[:, 1:].T).full().ravel()
+        if not section.relaxation:
+            return strain, fibres[:, 0] * strain
+        # As much as the long-term stiffness would bend under that moment.
+        change = change + np.nan_to_num(self._branches(member, x)[0] / section.stiffness(x))
+        return strain, fibres[:, 0] * largest(change.T, fibres[:, 1:].T).full().ravel()
 
     def largest_bending(self, member: str) -> tuple[float, float]:
         """Largest fibre strain and stress (Pa) by bending anywhere along a member whose section has a shape.

@@ -22,7 +22,7 @@ from .. import tolerances
 from ..description.laws import SectionLaw
 from ..description.scene import Scene
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, numbers
+from ..mathematics.arrays import Array, Index, numbers
 from ..mathematics.forms import Form
 from ..mathematics.hysteresis import energies, updated
 from ..mathematics.potentials import derivatives_of, deviation
@@ -108,6 +108,11 @@ class AlongElement(Term):
     def memory(self) -> int:
         """Those of the form."""
         return self.form.memory
+
+    @property
+    def memory_columns(self) -> Index:
+        """The last of each point."""
+        return np.arange(self.nodes * self.width).reshape(self.nodes, -1)[:, self.width - self.memory :].ravel()
 
     def remembered(self) -> ca.Function:
         """As :meth:`.Term.remembered`."""

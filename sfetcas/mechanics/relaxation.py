@@ -113,9 +113,10 @@ def relaxations_in(parts: Parts) -> Iterator[One]:
                 turns, places = tuple(parts.rotations.turns[e].tolist()), tuple(relaxing[0, i, e].tolist())
                 data = numbers((roots[e - first] * root).reshape(-1))
                 yield One(kind, name, "", data, turns, places, element=e)
-                strains = parts.segments.strains[e].tolist()
-                for strain, left in zip(strains, relaxing[1, i, e].tolist()) if relaxing[1, i, e].min() >= 0 else ():
-                    yield One(straining, name, "", np.reshape(root, (1,)), (), (strain, left), element=e)
+                if relaxing[1, i, e, 0] < 0:
+                    continue
+                for pair in zip(parts.segments.strains[e].tolist(), relaxing[1, i, e].tolist(), strict=True):
+                    yield One(straining, name, "", np.reshape(root, (1,)), (), pair, element=e)
 
 
 def _roots(parts: Parts, name: str) -> Array:
@@ -185,7 +186,7 @@ def carried(model: Any, member: str, q: Array, y: Array) -> tuple[Array, Array] 
     if not model.segments.relaxing.shape[1]:
         return None
     part = model.elements_of(member)
-    weight, axes = model.beams.weight[part], model.element.axes
+    weight, unit = model.beams.weight[part], _strain_units(model, member)
     moment, strain = np.zeros((*weight.shape, 3)), np.zeros((*weight.shape, 3))
     values = np.append(y, 0.0)[model.positions.retained]
     for group in model.connections:
@@ -203,12 +204,16 @@ def carried(model: Any, member: str, q: Array, y: Array) -> tuple[Array, Array] 
             eta, left = values[group.places[own]].transpose(1, 0, 2)
             root = values_of(group.data)[own]
             point = np.argmax(model.segments.strains[part][e] == group.places[own][:, :1], axis=1)
-            line, cuts = model.scene.center_lines[member], model.mesh.cuts[member]
-            x, chosen = cuts[e] + np.diff(cuts)[e] * model.element.points[point], line.strained_axes(model.space)
-            section = model.scene.sections[str(model.scene.members[member].section)]
-            compliance = section.compliance(x)[:, chosen] * model.scales.force
-            part_of = root * (root * eta - left) * np.sqrt(compliance / weight[e, point][:, None])
-            full = np.zeros((len(own), 3))
-            full[:, chosen] = part_of[:, :axes]
-            np.add.at(strain, (e, point), full)
+            chosen = model.scene.center_lines[member].strained_axes(model.space)
+            np.add.at(strain, (e[:, None], point[:, None], chosen), root * (root * eta - left) * unit[e, point])
     return moment, strain
+
+
+def _strain_units(model: Any, member: str) -> Array:
+    """Strains (elements, points, axes) of a member for scaled strains of one."""
+    cuts, line = model.mesh.cuts[member], model.scene.center_lines[member]
+    x = cuts[:-1, None] + np.diff(cuts)[:, None] * model.element.points
+    section = model.scene.sections[str(model.scene.members[member].section)]
+    compliance = section.compliance(x.ravel())[:, line.strained_axes(model.space)] * model.scales.force
+    weight = model.beams.weight[model.elements_of(member)]
+    return np.asarray(np.sqrt(compliance.reshape(*x.shape, -1) / weight[..., None]))

@@ -232,6 +232,11 @@ class Term(Components, abc.ABC):
         """Internal variables of each of its points, which the steps before have left; they are the last of its data."""
         return 0
 
+    @property
+    def memory_columns(self) -> Index:
+        """Numbers of these among the data, one point after the other."""
+        return np.zeros(0, np.intp)
+
     def remembered(self) -> ca.Function:
         """``(q, u, data, load, lam) ->`` internal variables of its points, one point after the other, at the end of a
         step, and what the step has dissipated; of a kind with :attr:`memory`.
