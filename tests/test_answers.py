@@ -233,9 +233,11 @@ def test_expressions_say_what_answers_say():
             "tip": {"node": "B", "moment": [0.05, 0, 0.02]},
         },
     )
+    tube = {"members": "m", "section": "s", "start": -0.1, "length": 0.6, "curvature": 0.5, "angle": 0.7}
+    sheath = beam(square, loads=force, tubes={"t": tube})
     met = set()
     yielding = beam({**square, "stretch": True, "shear": True}, loads=force)
-    for scene in (frame(), rod, yielding, driven("plane"), driven("space")):
+    for scene in (frame(), rod, yielding, driven("plane"), driven("space"), sheath):
         names = []
         for kind in (kind for kind in ANSWERS if {"statics", "parameters"} <= set(kind.where)):
             table = {"reactions": "nodes"}.get(kind.table, kind.table)
@@ -243,6 +245,8 @@ def test_expressions_say_what_answers_say():
                 text = kind.name.replace("NAME", record) + (" at 0.3" if kind.along else "")
                 turns = kind.key in ("quaternion", "angle", "") and kind.table != "members"
                 if turns and record in scene.nodes and scene.nodes[record].joint != "rigid":
+                    continue
+                if scene.tubes and kind.key in ("curvature", "bending_strain", "bending_stress"):
                     continue
                 try:
                     check_answer(scene, answer_name(text))

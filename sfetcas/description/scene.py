@@ -259,6 +259,11 @@ class Scene(Record):
         """The parts of members along which each tube lies, by name."""
         return MappingProxyType({name: runs_of(tube, self.center_lines) for name, tube in self.tubes.items()})
 
+    @cached_property
+    def tubed(self) -> frozenset[str]:
+        """Names of the members along which tubes lie."""
+        return frozenset(run.member for runs in self.tube_runs.values() for run in runs)
+
     @property
     def started(self) -> bool:
         """Whether nodes have ``start`` places, which choose among equilibria."""

@@ -628,7 +628,8 @@ def strain_notes(fields: Fields) -> tuple[str, ...]:
     for name in fields.model.members:
         record = scene.members[name]
         section = scene.sections[str(record.section)] if record.type == "flexible" else None
-        if section is None or section.shape is None or section.stretch_law is not None:
+        # What has tubes stretches with these, by less, and cannot be asked to.
+        if section is None or section.shape is None or section.stretch_law is not None or name in scene.tubed:
             continue
         x = fields.model.mesh.cuts[name]
         left_out = section.replace(stretch=True, shear=section.sheared).compliance(x) - section.compliance(x)

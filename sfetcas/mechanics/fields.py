@@ -184,8 +184,7 @@ class Fields:
             strain = strain + np.einsum("nji,nj->ni", arms, forces)
         branches = self._branches(member, x)
         strain = strain - branches[0]
-        tubed = any(run.member == member for runs in model.scene.tube_runs.values() for run in runs)
-        if tubed:
+        if member in model.scene.tubed:
             strain = self._shared_with_tubes(member, x, strain)
         elif section.law is not None and section.law.remembers:
             # Moments are no function of curvatures: those of the elements themselves are told.

@@ -299,7 +299,8 @@ def _check_inside(parts: Parts, name: str, magnet: Magnet) -> None:
     if magnet.member is None:
         places = values_of(scene.nodes[str(magnet.node)].position)[None, :]
     else:
-        x = values_of(points_of(parts, magnet.member))[inside(parts, magnet.member, magnet.span)]
+        x = values_of(points_of(parts, magnet.member))
+        x = x[magnet.inside(x.mean(axis=1))]
         places = values_of(scene.center_lines[magnet.member].positions(x.ravel()))
     for key, field in scene.fields.items():
         if field.uniform:

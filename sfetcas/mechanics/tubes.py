@@ -336,6 +336,8 @@ def angles_like(target: Any, y: Array, source: Any, values: Array) -> None:
 
     ``values`` are the displacement unknowns of the other model, of the same scene on another mesh.
     """
+    if not target.scene.tubes:
+        return
     known = source.positions.retained[:, 0]
     there = np.where(known < 0, 0.0, np.append(values, 0.0)[known])
     for tube in target.scene.tubes:

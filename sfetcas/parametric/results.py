@@ -205,8 +205,7 @@ class Results:
                 raise SceneError(unknown(node, flexible, "flexible members"))
             if name.at is not None and not 0.0 <= name.at <= 1.0:
                 raise SceneError(f"found {name.at:g}, accepted: fractions of the length, from 0 to 1")
-            tubed = any(run.member == node for runs in scene.tube_runs.values() for run in runs)
-            if tubed and kind.key in BY_FORCES[2:]:
+            if node in scene.tubed and kind.key in BY_FORCES[2:]:
                 message = f"found the {kind.key.replace('_', ' ')} along a member with tubes, accepted: its position,"
                 raise SceneError(f"{message} rotation, force and moment, or answers of solve(scene)")
             section = scene.sections[str(scene.members[node].section)]
