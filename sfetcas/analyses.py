@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .description.scene import Scene, check_loaded, check_scene
 from .equilibria import statics, stops
 from .equilibria.settings import Settings, settings_with
-from .errors import SceneError
+from .errors import SceneError, SolveError, Status
 from .mechanics.resistance import check_resistance
 
 if TYPE_CHECKING:
@@ -60,18 +62,25 @@ def solve(
     settings = settings_with(settings, changes)
     if settings.accuracy_of and scene.analysis.type in ("path", "modes"):
         raise SceneError(f"accuracy_of: found with type {scene.analysis.type!r}, accepted: static or dynamic")
-    if scene.analysis.type == "dynamic":
-        from .dynamics.simulation import simulate
+    try:
+        if scene.analysis.type == "dynamic":
+            from .dynamics.simulation import simulate
 
-        return simulate(scene, settings, progress)
-    check_loaded(scene)
-    check_resistance(scene)
-    if scene.analysis.type == "path":
-        from .paths.paths import follow_path
+            return simulate(scene, settings, progress)
+        check_loaded(scene)
+        check_resistance(scene)
+        if scene.analysis.type == "path":
+            from .paths.paths import follow_path
 
-        return follow_path(scene, settings)
-    if scene.analysis.type == "modes":
-        from .dynamics.modes import find_modes
+            return follow_path(scene, settings)
+        if scene.analysis.type == "modes":
+            from .dynamics.modes import find_modes
 
-        return find_modes(scene, settings)
-    return stops.solve_stopped(scene, settings) if scene.stopped or scene.reversed else statics.solve(scene, settings)
+            return find_modes(scene, settings)
+        stopped = scene.stopped or scene.reversed
+        return stops.solve_stopped(scene, settings) if stopped else statics.solve(scene, settings)
+    except np.linalg.LinAlgError as error:
+        raise SolveError(Status.FAILED, f"{FAR_APART}: {error}") from None
+
+
+FAR_APART = "numbers of the scene are too far apart for matrices in double precision"

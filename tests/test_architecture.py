@@ -45,6 +45,7 @@ ORDER = [
     "mathematics.hysteresis",
     "mathematics.potentials",
     "mathematics.statements",
+    "mathematics.splines",
     "description",
     "description.described",
     "description.records",
@@ -348,7 +349,15 @@ DRAWING = ("plot", "animate")
 PYPLOT = "pictures.showing"
 """The module that imports pyplot, which looks for a window system, when a figure is to be shown."""
 
-DISPATCHERS = ("analyses", "outputs", "cli", "equilibria.statics", "description.laws", "description.stretch_laws")
+DISPATCHERS = (
+    "analyses",
+    "outputs",
+    "cli",
+    "equilibria.statics",
+    "description.field_tables",
+    "description.laws",
+    "description.stretch_laws",
+)
 """What chooses, by a scene or by the words of a command, among much of which a run needs little: it imports what it
 chose.  Potentials alone, of all that describes a scene, are expressions of CasADi."""
 

@@ -15,8 +15,8 @@ from sfetcas.description.records import Record
 PUBLIC = {name: getattr(sfetcas, name) for name in sfetcas.__all__}
 RECORDS = {name: thing for name, thing in PUBLIC.items() if inspect.isclass(thing) and issubclass(thing, Record)}
 
-MOST_LINES = 200
-"""The longest, of OptimalControl with its inherited methods, has some 150."""
+MOST_LINES = 220
+"""The longest, of CrossSection with a paragraph for each of its 32 keys, has 215; others have up to 150."""
 
 
 @pytest.mark.parametrize("name", PUBLIC)

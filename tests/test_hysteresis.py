@@ -1,5 +1,7 @@
 """Sections whose laws have memory: loops of moments, steps of structures, energies, by independent ways."""
 
+import itertools
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -110,6 +112,30 @@ def test_loops_of_a_moment(law, dimension):
     dissipated = [step.energy["dissipated"] for step in found]
     assert (np.diff([0.0, *dissipated]) > -1e-11).all()
     assert found[-1].table("members", "beam")["dissipated"] == pytest.approx(dissipated[-1], rel=1e-14)
+
+
+def test_work_of_a_force_is_stored_and_dissipated():
+    """Loaded and unloaded, between the forces at which one more integration point begins to yield."""
+    one = scene(load=force([0, -1.0]), members={"beam": {"nodes": ["A", "B"], "section": "s", "elements": 1}})
+
+    def solved(*factors):
+        return sfetcas.solve(one.replace({"members.beam.element": "SFET3", "analysis": steps(*factors)})).steps
+
+    def bent(factor, at):
+        return abs(solved(factor)[0].along("beam", at)["curvature"].ravel()[-1])
+
+    begins = [brentq(lambda f, at=at: bent(f, at) - 1.0, 0.9, 3.4, xtol=1e-13) for at in (0.0, 0.5)]
+    points, weights = np.polynomial.legendre.leggauss(10)
+    ends = [0.0, *begins, 3.5, 0.0]
+    parts = [0.5 * (a + b) + 0.5 * (b - a) * points for a, b in itertools.pairwise(ends)]
+    found = solved(*np.concatenate([*parts[:3], ends[3:4], parts[3], ends[4:]]).tolist())
+    tips = np.array([-step.position("B")[1] for step in found])
+    peak, tips = tips[30], np.delete(tips, [30, 41]).reshape(4, 10)
+    integrals = [0.5 * (b - a) * weights @ tip for (a, b), tip in zip(itertools.pairwise(ends), tips, strict=True)]
+    for step, work in ((found[30], 3.5 * peak - sum(integrals[:3])), (found[-1], -sum(integrals))):
+        # Ten points integrate what is smooth to rounding; steps are solved to 1e-12.
+        assert step.energy["elastic"] + step.energy["dissipated"] == pytest.approx(work, abs=1e-10)
+    assert found[-1].energy["dissipated"] > 0.3
 
 
 @pytest.mark.parametrize("name", ["sliders", "superelastic"])
@@ -299,7 +325,7 @@ def test_motion(law):
         ({"sections.s.rhoA": 1.0, "analysis": {**MOTION, "initial": "equilibrium"}}, "found 'equilibrium', accepted"),
         ({"contacts.floor": {"type": "plane", "point": [0, -1], "normal": [0, 1], "members": "all"}}, "contacts"),
         ({"springs.k": {"node": "A", "stiffness": 2.0, "stop": [-0.1, 0.1]}}, "springs.k.stop: found a stop"),
-        ({"sections.s.law": {**PLASTIC, "ratio": 1.0}}, "ratio: found 1, accepted: below 1"),
+        ({"sections.s.law": {**PLASTIC, "ratio": 1.0}}, "ratio: found 1, accepted: from 1e-06 on, and below 1"),
         ({"sections.s.law": {**PLASTIC, "stress": 1.0}}, "found 'moment' and 'stress', accepted: one of them"),
         ({"sections.s.law": {**SUPER, "curvature": 0.9}}, "curvature: found 0.9, 0.9 times that at which"),
         ({"sections.s.law": {**SUPER, "unloading": 1.5}}, "unloading: found 1.5 beside a moment of 1"),
@@ -353,3 +379,16 @@ def test_errors_are_told():
     for one, other in zip(coarse, fine, strict=True):
         error = np.abs(one.position("B") - other.position("B")).max() / portal.size
         assert error < one.certificate.error_estimate <= 1e-4
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("ratio", 1e-30, "from 1e-06 on"),
+        ("moment", 1e160, "from 1e-100 to 1e\\+100"),
+        ("moment", 1e-300, "from 1e-100"),
+    ],
+)
+def test_numbers_of_which_rounding_leaves_nothing_are_refused(key, value, words):
+    with pytest.raises(SceneError, match=words):
+        scene({**PLASTIC, key: value})

@@ -1,6 +1,7 @@
 """What no load or stiffness holds, and stiffness that is nothing: one sentence each, and nothing is looked for."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -280,3 +281,11 @@ def test_a_clamp_that_cannot_turn_is_named_however_the_solver_ends(angle, space)
     with pytest.raises(SolveError, match=r"motions\.turned asks for more than there is") as info:
         solve(made(table))
     assert info.value.status is Status.INFEASIBLE
+
+
+def test_numbers_that_are_too_far_apart_for_matrices_end_in_a_sentence():
+    scene = sfetcas.load(Path(__file__).parent.parent / "problems" / "tendon_parallel.toml")
+    (name,) = scene.tendons
+    words = "numbers of the scene are too far apart for matrices in double precision"
+    with np.errstate(all="ignore"), pytest.raises(SolveError, match=words):
+        sfetcas.solve(scene.replace({f"tendons.{name}.way": [{"member": next(iter(scene.members)), "offset": 1e300}]}))

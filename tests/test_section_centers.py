@@ -303,6 +303,28 @@ def test_a_line_that_is_moved_is_the_same_beam(soft):
     np.testing.assert_allclose(other["curvature"], one["curvature"], atol=1e-8)
 
 
+@pytest.mark.parametrize(
+    ("soft", "keys"),
+    [
+        (SOFT, {"stretch_law": {"type": "bilinear", "force": 0.5, "ratio": 0.3}}),
+        (SOFT, {"law": {"type": "bilinear", "moment": 0.8, "ratio": 0.4}}),
+        ({}, {"law": {"type": "elastic-plastic", "moment": 0.8, "ratio": 0.4}}),
+    ],
+    ids=["stretch law", "law", "memory"],
+)
+def test_laws_of_a_line_that_is_moved(soft, keys):
+    keys = {f"sections.s.{key}": value for key, value in keys.items()}
+    scenes = (one.replace(keys | {"analysis.accuracy": 1e-6}) for one in pair(soft))
+    plain, aside = (sfetcas.solve(one).last for one in scenes)
+    # Both are accurate to 1e-6.
+    np.testing.assert_allclose(aside.position("P"), plain.position("B"), atol=1e-6)
+    one, other = (found.along("m", [0.2, 0.7]) for found in (plain, aside))
+    np.testing.assert_allclose(other["curvature"], one["curvature"], atol=1e-5)
+    if soft:
+        arms = np.array([0.0, *ASIDE])
+        np.testing.assert_allclose(other["strain"], one["strain"] + np.cross(one["curvature"], arms), atol=1e-6)
+
+
 def arc(aside, dimension, soft):
     """A quarter of a ring and the same with its line at another radius: numbers per length of the line change."""
     radius = 1.0
@@ -665,3 +687,18 @@ def test_refused_integrator():
     words = "found a mass centre off the line with the integrator 'conserving', accepted: radau-3, radau-2, generalised"
     with pytest.raises(SceneError, match=words):
         sfetcas.solve(cantilever(HUNG, analysis=analysis))
+
+
+def test_matrices_that_are_refused_for_what_they_are():
+    """Nearly nothing on the diagonal is no lack of symmetry; what has no entries is no matrix."""
+    small = WHOLE.copy()
+    small[3, 3] = 1e-30
+    for matrix, words in ((small, "positive definite"), (np.array(3.0), "six rows of six")):
+        with pytest.raises(SceneError, match=words):
+            CrossSection(stiffness=matrix)
+
+
+def test_an_entry_beside_the_diagonal_is_no_parameter():
+    scene = cantilever({"stiffness": WHOLE.tolist()})
+    with pytest.raises(SceneError, match=r"a Parameter that gives both, .*stiffness\.3\.0"):
+        sfetcas.parametric(scene, ["sections.s.stiffness.0.3"], ["nodes.B.position"])

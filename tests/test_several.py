@@ -249,6 +249,12 @@ def test_notes_say_how_the_search_was_done_and_that_it_may_not_be_complete():
     assert "there are no others" in solve(column(1.5)).steps[0].notes[-1]
 
 
+def test_the_scan_of_what_keeps_its_length_is_not_of_what_stretches():
+    (key,) = column(1.5).sections
+    note = solve(column(1.5).replace({f"sections.{key}.EA": 50.0}), runs=10).steps[0].notes[-1]
+    assert "there may be more equilibria" in note
+
+
 def test_ways_out_that_do_not_balance_are_told():
     # The straight column is unstable; without a run only the stable state is known, and one alone balances.
     assert "do not balance" not in solve(column(1.5), runs=0).last.notes[-1]

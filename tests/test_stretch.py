@@ -554,3 +554,10 @@ def test_what_is_not_solved_is_refused():
     drum = {"drum": {"type": "circle", "center": [0, -3], "radius": 1.0, "member": "m"}}
     with pytest.raises(SceneError, match=r"contacts.drum: found the member 'm', which stretches, accepted"):
         strip(100.0, None, contacts=drum)
+
+
+@pytest.mark.parametrize(("key", "words"), [("EA", "stretch"), ("GA2", "shear along b2")])
+def test_a_section_so_soft_that_rounding_is_all_that_is_left_is_refused(key, words):
+    scene = sfetcas.load(PROBLEMS / "cantilever_stretching.toml")
+    with pytest.raises(SceneError, match=f"against {words} of 1e-300 times .* accepted: at least 1e-08 times"):
+        scene.replace({f"sections.strip.{key}": 1e-300})

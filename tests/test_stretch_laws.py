@@ -218,3 +218,8 @@ def test_what_is_not_solved_is_refused():
     floor = {"type": "plane", "point": [0, -1], "normal": [0, 1], "member": "m"}
     with pytest.raises(SceneError, match="found the member 'm', which has a law of stretch, accepted"):
         scene.replace({"contacts.floor": floor})
+
+
+def test_a_table_that_is_too_steep_is_refused():
+    with pytest.raises(SceneError, match=r"found slopes from .* up to 1e\+12 times the smallest"):
+        sfetcas.CrossSection(EI3=1.0, stretch_law={"type": "table", "strain": [0, 1e-30, 0.1], "force": [0, 1.0, 60.0]})

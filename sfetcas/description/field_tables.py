@@ -8,11 +8,9 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Any, final
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, model_validator
-from scipy.interpolate import make_interp_spline
 
 from .. import tolerances
 from ..errors import SceneError
@@ -107,46 +105,25 @@ class FieldTable(Record):
         return np.stack([self.Bx, self.By, nothing if self.Bz is None else self.Bz], axis=1)
 
     @cached_property
-    def _spline(self) -> ca.Function:
-        """Place along the axes of the grid -> field (3,)."""
-        grid = list(self.grid.values())
-        # Points in the order of the grid, the first axis fastest.
-        order = np.lexsort([getattr(self, name) for name in self.grid])
-        values = self._values[order].reshape(*(len(places) for places in grid[::-1]), 3)
-        knots: list[list[float]] = []
-        for axis, places in enumerate(grid[::-1]):
-            spline = make_interp_spline(places, values, axis=axis)
-            values, knots = np.moveaxis(spline.c, 0, axis), [spline.t.tolist(), *knots]
-        return ca.Function.bspline("table", knots, values.ravel().tolist(), [3] * len(grid), 3, {"never_inline": True})
+    def spline(self) -> Any:
+        """The splines through the values, a :class:`~sfetcas.mathematics.splines.GridSpline`."""
+        # A scene by itself needs no CasADi.
+        from ..mathematics.splines import GridSpline
 
-    @cached_property
-    def _slopes(self) -> ca.Function:
-        """Place along the axes of the grid -> derivatives of the field (3, axes) by it."""
-        place = ca.MX.sym("place", len(self.grid))
-        return ca.Function("slopes", [place], [ca.jacobian(self._spline(place), place)], {"never_inline": True})
+        order = np.lexsort([getattr(self, name) for name in self.grid])
+        return GridSpline(list(self.grid.values()), self._values[order])
 
     def __call__(self, place: Any) -> Any:
         """The field (3,), T, at a place (3,), m, numbers or CasADi expressions.
 
         Beyond the grid, where solvers may look on their way but no answer may be, it goes on straight.
         """
-        if isinstance(place, np.ndarray):
-            return self(ca.DM(place)).full().ravel()
-        kept = [ca.fmin(ca.fmax(place[i], low), high) for i, (low, high) in enumerate(self.ends.values())]
-        here = ca.vertcat(*kept)
-        beyond = ca.vertcat(*[place[i] - each for i, each in enumerate(kept)])
-        return self._spline(here) + ca.mtimes(self._slopes(here), beyond)
+        return self.spline(place)
 
     @cached_property
     def ends(self) -> Mapping[str, tuple[float, float]]:
         """Least and largest place of the grid along each of its axes, m."""
         return {name: (float(places[0]), float(places[-1])) for name, places in self.grid.items()}
-
-    def beyond(self, place: Any) -> Any:
-        """How far a place (3,), m, is outside of the grid along each of its axes, m, by CasADi; zero within."""
-        return [
-            ca.fmax(ca.fmax(low - place[i], place[i] - high), 0.0) for i, (low, high) in enumerate(self.ends.values())
-        ]
 
     def outside(self, places: NDArray[np.float64]) -> tuple[str, float, float, float] | None:
         """Of the first of the places (n, 3), m, outside of the grid: axis, where it is, and the ends of the grid."""

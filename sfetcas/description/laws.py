@@ -21,7 +21,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array, numbers, values_of
 from ..mathematics.forms import BOTH, Form, hermite_of, monotone_slopes
 from ..mathematics.interpolation import gauss
-from .records import Number, Numbers, Positive, Record, listed, number, say
+from .records import Number, Numbers, Positive, Record, Sized, listed, number, say
 
 __all__ = [
     "Bilinear",
@@ -167,7 +167,7 @@ class Bilinear(_OneAxis):
     """
 
     type: Literal["bilinear"] = "bilinear"
-    moment: Positive
+    moment: Sized
     ratio: Positive
     about: About = "b3"
 
@@ -206,7 +206,7 @@ class RambergOsgood(_OneAxis):
     """
 
     type: Literal["ramberg-osgood"] = "ramberg-osgood"
-    moment: Positive
+    moment: Sized
     alpha: Positive
     exponent: Number
     about: About = "b3"
@@ -251,7 +251,7 @@ class Plateau(_OneAxis):
     shaped: ClassVar[str] = "rectangle"
 
     type: Literal["plateau"] = "plateau"
-    stress: Positive
+    stress: Sized
     about: Literal["b2", "b3"] = "b3"
 
     @property
@@ -287,7 +287,19 @@ def signed(curvature: tuple[float, ...], values: tuple[float, ...], names: tuple
         for before, after in pairwise(given):
             if after <= before:
                 raise SceneError(f"found {after:g} after {before:g}, accepted: rising numbers", (name,))
+    slopes = [rise / run for rise, run in zip(*(map(_apart, pairwise(k)) for k in (values, curvature)), strict=True)]
+    if not max(slopes) <= STEEPEST * min(slopes):
+        found = f"found slopes from {min(slopes):g} to {max(slopes):g}"
+        raise SceneError(f"{found}, accepted: the largest up to {STEEPEST:g} times the smallest", (names[0],))
     return odd
+
+
+def _apart(pair: tuple[float, float]) -> float:
+    return pair[1] - pair[0]
+
+
+STEEPEST = 1e12
+"""Largest slope of a table over the smallest: with more a matrix has nothing of the smaller one."""
 
 
 @final
@@ -652,13 +664,17 @@ SMOOTHED = 1e-3
 """Curvature over thickness / width^2 below which the ribbon of Sadowsky is smoothed; that of a plate strip is at 1."""
 
 
+LEAST_RATIO = 1e-6
+"""Least share of the stiffness that is left: with less the shape of what yields is rounding (1e-12 was not solved)."""
+
+
 class _Remembering(_OneAxis):
     """A law with memory: of the moment about an axis, or of the stress of the fibres of a shape."""
 
     remembers: ClassVar[bool] = True
 
-    moment: Positive | None = None
-    stress: Positive | None = None
+    moment: Sized | None = None
+    stress: Sized | None = None
     ratio: Positive
     about: About = "b3"
 
@@ -672,8 +688,8 @@ class _Remembering(_OneAxis):
         if (self.moment is None) == (self.stress is None):
             found = "neither 'moment' nor 'stress'" if self.moment is None else "'moment' and 'stress'"
             raise SceneError(f"found {found}, accepted: one of them")
-        if not self.ratio < 1.0:
-            raise SceneError(f"found {self.ratio:g}, accepted: below 1", ("ratio",))
+        if not LEAST_RATIO <= self.ratio < 1.0:
+            raise SceneError(f"found {self.ratio:g}, accepted: from {LEAST_RATIO:g} on, and below 1", ("ratio",))
         return self
 
     def check(self, section: Any) -> None:
@@ -813,9 +829,9 @@ class Superelastic(_Remembering):
     """
 
     type: Literal["superelastic"] = "superelastic"
-    curvature: Positive | None = None
-    strain: Positive | None = None
-    unloading: Positive
+    curvature: Sized | None = None
+    strain: Sized | None = None
+    unloading: Sized
 
     @model_validator(mode="after")
     def _ends(self) -> Superelastic:

@@ -28,6 +28,7 @@ __all__ = [
     "OnPart",
     "Positive",
     "Record",
+    "Sized",
     "Turn",
     "Vector",
     "brief",
@@ -180,6 +181,16 @@ def _positive(value: float) -> float:
     return value
 
 
+def _sized(value: float) -> float:
+    if not LEAST <= value <= 1.0 / LEAST:
+        raise ValueError(f"found {value:g}, accepted: from {LEAST:g} to {1.0 / LEAST:g}")
+    return value
+
+
+LEAST = 1e-100
+"""Least number whose square, times other numbers, is above zero in double precision."""
+
+
 def _not_negative(value: float) -> float:
     if value < 0.0:
         raise ValueError(f"found {say(value)}, accepted: zero or a number above zero")
@@ -243,6 +254,9 @@ Number = Annotated[float, BeforeValidator(number)]
 
 Positive = Annotated[float, BeforeValidator(number), AfterValidator(_positive)]
 """A finite number above zero."""
+
+Sized = Annotated[Positive, AfterValidator(_sized)]
+"""A number above zero whose square is a number, too."""
 
 NotNegative = Annotated[float, BeforeValidator(number), AfterValidator(_not_negative)]
 """A number of zero or above."""

@@ -15,6 +15,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
+from ..mathematics.arrays import values_of
 from ..mathematics.quaternion import matrix
 from .actuation import Actuation, Magnet, MagneticField
 from .answers import answer_name, check_answer
@@ -664,6 +665,28 @@ def _needed(scene: Scene, member: str) -> tuple[str, ...]:
     return (*needed, "rhoA") if _massive(scene) else needed
 
 
+def _check_soft(scene: Scene) -> None:
+    """Refuse stretch and shear that are so soft beside bending that positions are nothing but rounding."""
+    for name, member in scene.members.items():
+        if not member.stretches(scene.sections):
+            continue
+        key, line = str(member.section), scene.center_lines[name]
+        section = scene.sections[key]
+        bending = values_of(section.stiffness_matrix(MIDDLE)).max()
+        soft = values_of(section.compliance(MIDDLE))[0] * bending / line.length**2
+        worst = int(np.argmax(soft))
+        if soft[worst] > SOFTEST:
+            what = ("stretch", "shear along b2", "shear along b3")[worst]
+            found = f"found a stiffness against {what} of {soft[worst] ** -1.0:.3g} times that against bending over the"
+            message = f"{found} squared length of the member {name!r}, accepted: at least {1.0 / SOFTEST:g} times"
+            raise SceneError(message, ("sections", key))
+
+
+MIDDLE = np.array([0.5])
+SOFTEST = 1e8
+"""Compliance times bending stiffness over squared length: the most with which equilibria were found (1e10 were not)."""
+
+
 def _check_off_line(scene: Scene) -> None:
     """Refuse centres off the line of members that are not flexible."""
     for name, member in scene.members.items():
@@ -989,6 +1012,7 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_axes,
     _check_dimension,
     _check_sections,
+    _check_soft,
     _check_releases,
     _check_bodies,
     _check_off_line,

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
-from ..mathematics.arrays import numbers, values_of
+from ..mathematics.arrays import TINY, numbers, values_of
 from ..mathematics.interpolation import power_series
 from .formulas import SAMPLES, Formula
 from .laws import Law
@@ -210,8 +210,13 @@ def _three(value: Any) -> tuple[Any, ...]:
     return entries
 
 
+def _many(value: Any) -> bool:
+    """Whether it has entries, as an array without dimensions has none."""
+    return isinstance(value, Iterable) and getattr(value, "ndim", 1) != 0
+
+
 def _center(value: Any) -> tuple[Any, ...]:
-    if isinstance(value, (str, Mapping)) or not isinstance(value, Iterable):
+    if isinstance(value, (str, Mapping)) or not _many(value):
         raise ValueError(f"found {say(value)}, accepted: two numbers, along b2 and b3")
     entries = tuple(value)
     if len(entries) != 2:
@@ -227,11 +232,11 @@ def _matrix(value: Any) -> tuple[tuple[Any, ...], ...]:
             raise ValueError(f"found {say(value)}, accepted: {accepted}, or {{at = [..], value = [matrices]}}")
         matrices = [_matrix(each) for each in value["value"]]
         return tuple(tuple(_entry(value["at"], [m[i][j] for m in matrices]) for j in range(6)) for i in range(6))
-    if isinstance(value, str) or not isinstance(value, Iterable):
+    if isinstance(value, str) or not _many(value):
         raise ValueError(f"found {say(value)}, accepted: {accepted}")
     rows = tuple(value)
     for row in rows:
-        if isinstance(row, (str, Mapping)) or not isinstance(row, Iterable):
+        if isinstance(row, (str, Mapping)) or not _many(row):
             raise ValueError(f"found {say(row)} for a row, accepted: {accepted}")
     found = tuple(tuple(row) for row in rows)
     if len(found) != 6 or any(len(row) != 6 for row in found):
@@ -390,7 +395,8 @@ class CrossSection(Record):
     law : table
         Moments that are not proportional to the change of the curvature: a table with the key ``type``
         (``bilinear``, ``ramberg-osgood``, ``plateau``, ``table``, ``stress-strain``, ``audoly-neukirch``,
-        ``sadowsky`` or, in Python, ``potential``) and the keys of that law.  Default: linear.
+        ``sadowsky``, ``elastic-plastic``, ``superelastic`` or, in Python, ``potential``) and the keys of that law.
+        Default: linear.
     stretch_law : table
         Axial force that is not proportional to the strain along: a table with the key ``type`` (``bilinear``, ``table``
         or, in Python, ``potential``) and the keys of that law.  Default: linear.
@@ -498,6 +504,10 @@ class CrossSection(Record):
         return self
 
     def _check_stretch_law(self, law: AnyStretchLaw) -> None:
+        if self.stiffness_ is not None:
+            raise SceneError(
+                "found beside a stiffness matrix, which has all of it, accepted: one of them", ("stretch_law",)
+            )
         given = "'EA'" if self.EA is not None else "stretch = true" if self.stretch else ""
         if law.gives and given:
             message = f"found {given} beside the law {law.type!r}, which says that stiffness, accepted: one of them"
@@ -571,7 +581,10 @@ class CrossSection(Record):
             raise SceneError(message, ("stiffness",))
         unit = np.sqrt(diagonal)
         scaled = matrices / unit[:, :, None] / unit[:, None, :]
-        apart = np.abs(scaled - scaled.transpose(0, 2, 1))
+        twins = matrices.transpose(0, 2, 1)
+        # Beside the diagonal as well as by themselves: what is next to nothing need not have a twin.
+        apart = np.abs(matrices - twins) / np.maximum(np.maximum(np.abs(matrices), np.abs(twins)), TINY)
+        apart = np.minimum(apart, np.abs(scaled - scaled.transpose(0, 2, 1)))
         if apart.max() > tolerances.WRITTEN:
             n, i, j = (int(k) for k in np.unravel_index(apart.argmax(), apart.shape))
             i, j = min(i, j), max(i, j)
@@ -640,10 +653,7 @@ class CrossSection(Record):
         return found + [entry for row in self.stiffness_ or () for entry in row]
 
     def leaves(self, axis: int) -> tuple[str, str] | None:
-        """Key and words of what takes a plane member out of its plane, of which the axis b2 or b3 (2 or 3) is across.
-
-        None where nothing does.
-        """
+        """Key and words of what takes a member out of the plane across its axis b2 or b3, given as 2 or 3, or None."""
         if self.couples(axis):
             return "coupling", "couples bending in x-y with twist or bending out of it"
         inside = {2: (0, 2, 4), 3: (0, 1, 5)}[axis]
@@ -705,17 +715,7 @@ class CrossSection(Record):
         return [name for name in names if name not in known]
 
     def stiffness(self, x: ArrayLike) -> Floats:
-        """Stiffness along the member, with a law that at rest.
-
-        Parameters
-        ----------
-        x : (n,)
-            Fractions of the length.
-
-        Returns
-        -------
-        (n, 3) - GJ, EI2, EI3 in N m2 (about b1, b2, b3), nan where not defined
-        """
+        """GJ, EI2, EI3, (n, 3) N m2, at fractions x (n,), with a law those at rest; nan where not defined."""
         if self.law is None:
             return self.own_stiffness(x)
         found = self.stiffness_matrix(x)[:, [0, 1, 2], [0, 1, 2]]
@@ -793,33 +793,13 @@ class CrossSection(Record):
     # Centres off the line are a Q of their own: with the centre at c the strain there is gamma + kappa x c.
 
     def compliance_of_forces(self, x: ArrayLike) -> Floats:
-        """Strains by forces of a section that is neither bent nor twisted: ``A^-1``.
-
-        Parameters
-        ----------
-        x : (n,)
-            Fractions of the length.
-
-        Returns
-        -------
-        (n, 3, 3) - stretch, shear along b2 and b3 by forces along b1, b2, b3, 1/N; zero where it does not yield
-        """
+        """Strains by forces of a section neither bent nor twisted, (n, 3, 3) 1/N, zero where stiff, at x (n,)."""
         if self.stiffness_ is not None:
             return _inverse(self._matrices(x)[:, :3, :3])
         return self.compliance(x)[:, :, None] * np.eye(3)
 
     def arms(self, x: ArrayLike) -> Floats:
-        """Strains of the centre line by twist and bending where no force acts: ``Q``.
-
-        Parameters
-        ----------
-        x : (n,)
-            Fractions of the length.
-
-        Returns
-        -------
-        (n, 3, 3) - stretch, shear along b2 and b3 by changes of twist and of the curvatures about b2 and b3, m
-        """
+        """Strains of the line by changes of twist and curvatures without forces, (n, 3, 3) m, at fractions x (n,)."""
         x = np.atleast_1d(numbers(x))
         if self.stiffness_ is not None:
             whole = self._matrices(x)
@@ -850,17 +830,7 @@ class CrossSection(Record):
         return whole[:, 3:, 3:] + np.einsum("nji,njk->nik", whole[:, :3, 3:], self.arms(x))
 
     def stiffness_matrix(self, x: ArrayLike) -> Floats:
-        """Stiffness along the member as matrices, with what couples twist and bending, where no force acts.
-
-        Parameters
-        ----------
-        x : (n,)
-            Fractions of the length.
-
-        Returns
-        -------
-        (n, 3, 3) - moments about b1, b2, b3 by changes of the curvatures about them, N m2, zero where not defined
-        """
+        """Moments by changes of twist and curvatures without forces, (n, 3, 3) N m2, at x (n,); zero if not known."""
         if self.stiffness_ is not None:
             return self._condensed(x)
         found = np.nan_to_num(self.own_stiffness(x))[:, :, None] * np.eye(3)

@@ -17,7 +17,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array, numbers, values_of
 from ..mathematics.forms import Form
 from .laws import MomentTable, check_parameters, parameters_given, signed
-from .records import Numbers, Positive, Record, say
+from .records import Numbers, Positive, Record, Sized, say
 
 __all__ = ["ALONG", "AnyStretchLaw", "StretchBilinear", "StretchLaw", "StretchPotential", "StretchTable"]
 
@@ -73,7 +73,7 @@ class StretchBilinear(StretchLaw):
     gives: ClassVar[bool] = False
 
     type: Literal["bilinear"] = "bilinear"
-    force: Positive
+    force: Sized
     ratio: Positive
 
     @property

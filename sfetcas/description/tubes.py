@@ -191,6 +191,11 @@ def _check_section(name: str, sections: Mapping[str, CrossSection], found: str, 
         raise SceneError(f"{found}, whose section has the law {section.law.type!r}, accepted: none with a law", (key,))
     if section.stretches:
         raise SceneError(f"{found}, whose section {name!r} stretches or shears, accepted: one that does not", (key,))
+    if section.off_line in ("tension_center", "shear_center"):
+        message = f"{found}, whose section {name!r} has a {section.off_line}, accepted: one without"
+        raise SceneError(message, (key,))
+    if section.relaxation:
+        raise SceneError(f"{found}, whose section {name!r} relaxes, accepted: one that does not", (key,))
 
 
 def _check_joined(

@@ -109,7 +109,7 @@ class MemorySteps:
         Raises
         ------
         SceneError, SolveError
-            Nothing holds the scene; a step has no equilibrium that could be found, :attr:`failed` says which.
+            Nothing holds the scene; a step has no equilibrium that could be found, ``failed`` says which.
         """
         now = self._sequence(self.meshes.pilot_mesh, ())
         if self.meshes.pilot_mesh is not self.meshes.target:

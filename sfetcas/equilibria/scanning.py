@@ -135,7 +135,7 @@ def _member(model: Model) -> str | None:
     """The member of a scene that has one, flexible, with a free end and the other one clamped or hinged."""
     scene = model.scene
     others = scene.contacts or scene.springs or scene.rotating is not None
-    others = others or any(member.off_line(scene.sections) for member in scene.members.values())
+    others = others or scene.stretches or any(member.off_line(scene.sections) for member in scene.members.values())
     joined = any(not group.kind.is_load for group in model.connections)
     if model.space or others or len(scene.members) != 1 or not model.has_potential or joined:
         return None

@@ -230,7 +230,7 @@ class Ways:
         if taut and error.status not in (Status.INFEASIBLE, Status.STRETCHED):
             rows = ", ".join(dict.fromkeys(free.redundant))
             details.append(f"{TAUT}: {rows}")
-        details += [] if error.status is Status.OUTSIDE else where_fields_end(self.scene)
+        details += [] if error.status is Status.OUTSIDE else where_fields_end(pilot.model.scene)
         if error.status in (Status.FAILED, Status.ITERATIONS):
             laws = (law_of(pilot.model.scene, name) for name in pilot.model.members)
             details += dict.fromkeys(law.hint for law in laws if law is not None and law.hint)

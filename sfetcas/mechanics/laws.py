@@ -297,7 +297,7 @@ NEWTON_STEPS = 30
 def bent_by(form: Form, axes: tuple[int, ...]) -> ca.Function:
     """``(moment, near, data) ->`` changes of the curvatures (3,), 1/m, at which a law gives the moments (3,), N m.
 
-    As :func:`curvature_by_moment`, at one place, by :data:`SYMBOLIC_STEPS` of Newton's method; ``data`` are those of
+    As :func:`curvature_by_moment`, at one place, by a few steps of Newton's method; ``data`` are those of
     :func:`law_data`.
     """
     chosen, derivatives = list(axes), derivatives_of(form)

@@ -78,7 +78,7 @@ class FieldFunction:
             return ca.SX(0)
         sizes = [high - low for low, high in table.ends.values()]
         at = self.unit * (place if place.numel() == 3 else ca.vertcat(place, 0))
-        return ca.mmax(ca.vertcat(*[far / size for far, size in zip(table.beyond(at), sizes, strict=True)]))
+        return ca.mmax(ca.vertcat(*[far / size for far, size in zip(table.spline.beyond(at), sizes, strict=True)]))
 
     def __str__(self) -> str:
         return f"function{_numbered(self)}"
@@ -297,13 +297,13 @@ def _check_inside(parts: Parts, name: str, magnet: Magnet) -> None:
     """Refuse a magnet that is in the undeformed scene where a field has no value."""
     scene = parts.scene
     if magnet.member is None:
-        places = values_of(scene.nodes[str(magnet.node)].position)[None, :]
+        places = values_of(numbers(scene.nodes[str(magnet.node)].position))[None, :]
     else:
         x = values_of(points_of(parts, magnet.member))
         x = x[magnet.inside(x.mean(axis=1))]
         places = values_of(scene.center_lines[magnet.member].positions(x.ravel()))
     for key, field in scene.fields.items():
-        if field.uniform:
+        if field.by_place is None:
             continue
         beyond = None if field.table is None else field.table.outside(places)
         if beyond is not None:

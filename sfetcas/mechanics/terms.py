@@ -125,7 +125,7 @@ class Term(Components, abc.ABC):
     def spans(self) -> int:
         """Along how many elements it is a string between two of their nodes, whose pull they do not carry; else 0.
 
-        They are that of :attr:`One.element` and the next ones, whose rotations are its sides.
+        They are that of the ``element`` of :class:`One` and the next ones, whose rotations are its sides.
         """
         return 0
 
@@ -593,7 +593,7 @@ def pulls_of(kind: Term) -> ca.Function:
     """``(q, u, data, load, lam) ->`` force (axes,) along a string between two nodes of elements, fixed axes."""
     arguments, sides = _symbols(kind)
     found = ca.densify(ca.vertcat(ca.SX(0, 1), *kind.pull(*sides, *arguments[2:])))
-    return _shared(f"pulls_{name_of(kind)}", arguments, [found], [*ARGUMENTS], ["pull"])
+    return _shared(f"pulls_{name_of(kind)}", arguments, [found], [*ARGUMENTS], ["pull"], kind)
 
 
 @functools.cache

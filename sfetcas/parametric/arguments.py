@@ -158,11 +158,19 @@ def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
         if re.fullmatch(MESHED, name):
             message = "found a number that changes the elements, and with them the unknowns"
             raise SceneError(f"{message}, accepted: one that leaves them as they are", ("arguments", name))
+        twin = re.fullmatch(BESIDE_DIAGONAL, name)
+        if twin is not None:
+            message = "found an entry that stands on both sides of the diagonal"
+            accepted = f"a Parameter that gives both, {name!r} and '{twin[1]}.{twin[3]}.{twin[2]}'"
+            raise SceneError(f"{message}, accepted: {accepted}", ("arguments", name))
     return [
         _own(scene, name, span) if isinstance(span, Parameter) else argument(scene, name, span)
         for name, span in spans.items()
     ]
 
+
+BESIDE_DIAGONAL = r"(sections\.[^.]+\.stiffness)\.(\d)\.(?!\2)(\d)"
+"""Names of entries of stiffness matrices that have a twin."""
 
 MESHED = (
     r"members\.[^.]+\.elements|(actuations|magnets)\.[^.]+\.(from|to)|tendons\.[^.]+\.way\.\d+\.(from|to|discs(\.\d+)?)"
