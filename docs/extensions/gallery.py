@@ -51,7 +51,11 @@ def _fenced(text: str, language: str = "text") -> str:
 
 
 def _page(entry: Entry, file: Path) -> str:
-    parts = [f"# {plain_text(entry.title)}\n"]
+    # In no table of contents: nearly two hundred titles beside each page would take much of the time of a build.
+    parts = [
+        f"---\norphan: true\n---\n\n# {plain_text(entry.title)}\n",
+        f"[{entry.group}]({_file_of(entry.group)}.md)\n",
+    ]
     if entry.text:
         parts.append(_fenced(entry.text, "{eval-rst}"))
     if entry.picture:
@@ -98,13 +102,12 @@ def _pages_of_groups(entries: list[Entry]) -> dict[str, str]:
     pages, rows = {}, []
     for group in GROUPS:
         chosen = [entry for entry in entries if entry.group == group]
-        page = group.lower().replace(" ", "-")
+        page = _file_of(group)
         table = [f"# {group}\n", "| | | |", "|---|---|---|"]
         for first in range(0, len(chosen), WIDE):
             cells = [_cell(entry) for entry in chosen[first : first + WIDE]]
             table.append(f"| {' | '.join(cells + [''] * (WIDE - len(cells)))} |")
-        names = "\n".join(entry.name for entry in chosen)
-        pages[page] = "\n".join(table) + f"\n\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"
+        pages[page] = "\n".join([*table, ""])
         drawn = [entry for entry in chosen if entry.picture]
         shown = " | ".join(_picture(entry, 200) for entry in drawn[:: max(1, len(drawn) // WIDE)][:WIDE])
         rows.append(f"| [{group}]({page}.md), {len(chosen)} | {shown} |")
@@ -115,6 +118,10 @@ def _pages_of_groups(entries: list[Entry]) -> dict[str, str]:
     listed = "\n".join(pages)
     table = "\n".join(["|" + " |" * (1 + WIDE), "|" + "---|" * (1 + WIDE), *rows])
     return {**pages, "index": f"{text}\n{table}\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"}
+
+
+def _file_of(group: str) -> str:
+    return group.lower().replace(" ", "-")
 
 
 def _cell(entry: Entry) -> str:
