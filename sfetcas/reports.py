@@ -268,6 +268,8 @@ def _report_step(step: Equilibrium, place: str, said: set[str]) -> None:
         print(f"  magnet {name}: torque {torque} N m, force {force} N")
     for name, entry in step.contacts.items():
         _report_contact(name, entry, sizes["N"])
+    if "dissipated" in step.energy:
+        print(f"  dissipated {step.energy['dissipated']:.9g} J")
     proof = step.certificate
     print(f"  {_kind(step)}, residual {proof.residual:.1e}, {error_in_words(proof.error_estimate, proof.error_of)}")
     for note in dict.fromkeys(step.notes):

@@ -1,6 +1,7 @@
 """Sections whose laws have memory: loops of moments, steps of structures, energies, by independent ways."""
 
 import itertools
+import re
 
 import casadi as ca
 import numpy as np
@@ -12,6 +13,7 @@ import sfetcas
 from sfetcas import Scene, SceneError
 from sfetcas.mathematics.forms import Form
 from sfetcas.mathematics.hysteresis import energies, lasting, updated
+from sfetcas.reports import report
 
 PLASTIC = {"type": "elastic-plastic", "moment": 1.0, "ratio": 0.2}
 MOTION = {"type": "dynamic", "end": 1.0, "step": 0.005, "output": 0.05}
@@ -112,6 +114,13 @@ def test_loops_of_a_moment(law, dimension):
     dissipated = [step.energy["dissipated"] for step in found]
     assert (np.diff([0.0, *dissipated]) > -1e-11).all()
     assert found[-1].table("members", "beam")["dissipated"] == pytest.approx(dissipated[-1], rel=1e-14)
+
+
+def test_reports_say_what_is_dissipated(capsys):
+    report(sfetcas.solve(scene(analysis=steps(2.0))), 0.0)
+    printed = re.search(r"dissipated ([0-9.]+) J", capsys.readouterr().out)
+    # The moment at which it yields times a curvature of (2 - 1) over the hardening; the rest hardening stores.
+    assert float(printed[1]) == pytest.approx(1.0 * 4.0, rel=1e-8)
 
 
 def test_work_of_a_force_is_stored_and_dissipated():

@@ -590,6 +590,7 @@ def test_bad_samples_are_refused_in_a_sentence(call, sentence):
         (None, "there is no such file, accepted: a CSV table"),
         ("", "found 0 lines, accepted: a line of names and a line of numbers for each case"),
         ("a,b\n", "found 1 line"),
+        ("0,1\n1,2\n", "found the numbers 0, 1 in the first line, accepted: names there"),
         ("a,a\n1,2\n", "found a name twice in the first line"),
         ("a,b\n1,2\n3\n", "found 1 cell in case 2 and 2 in the first line"),
         ("a,b\n1,x\n", "case 1.b: found 'x', accepted: a number"),

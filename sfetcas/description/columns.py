@@ -47,6 +47,8 @@ def read_columns(path: str | os.PathLike[str], row: str = "row", needed: Sequenc
         accepted = f"a line of names and a line of numbers for each {row}"
         raise SceneError(f"found {counted(len(lines), 'line')}, accepted: {accepted}", where)
     names = [name.strip() for name in lines[0]]
+    if all(map(_is_number, names)):
+        raise SceneError(f"found the numbers {enumerated(names)} in the first line, accepted: names there", where)
     if len(set(names)) < len(names):
         raise SceneError("found a name twice in the first line, accepted: each once", where)
     if not set(needed) <= set(names):
@@ -60,6 +62,14 @@ def read_columns(path: str | os.PathLike[str], row: str = "row", needed: Sequenc
         for name, cell in zip(names, line, strict=True):
             columns[name].append(_cell(cell, (*where, f"{row} {number}", name)))
     return columns
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _cell(text: str, where: tuple[str, ...]) -> float:

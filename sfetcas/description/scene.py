@@ -489,8 +489,6 @@ def _check_tendons(scene: Scene) -> None:
             raise error.within("tendons", name) from None
         if tendon.rubs:
             check_sliding(name, tendon, scene.analysis, scene.histories)
-        if scene.contacts:
-            raise SceneError("found with contacts, accepted: without tendons", ("contacts",))
         for way in tendon.way:
             section = None if way.member is None else scene.members[way.member].section
             law = None if section is None else scene.sections[section].law
