@@ -560,6 +560,70 @@ def test_motion(pull):
     np.testing.assert_allclose(*places, atol=2e-3)
 
 
+def beside(tables, way=None, **pull):
+    """The rod in the plane with further tables."""
+    return Scene.from_dict({**rod(way, dimension="plane", **pull).to_dict(), **tables})
+
+
+@pytest.mark.parametrize("initial", ["equilibrium", "undeformed"])
+def test_an_elastic_tendon_begins_as_long_as_its_way(initial):
+    """What it is longer by has no inertia, so it does not stand still at its value without loads."""
+    load = {"loads": {"p": {"type": "moment", "node": "B", "value": 0.3}}}
+    pulled = {"pull": 0.02, "stiffness": 50.0}
+    analysis = {"type": "dynamic", "end": 0.002, "step": 0.001, "output": 0.002, "initial": initial}
+    moved = sfetcas.solve(beside({**load, "analysis": analysis}, **pulled)).steps
+    if initial == "undeformed":
+        assert moved[0].energy["elastic"] == pytest.approx(0.5 * 50.0 * 0.02**2, rel=1e-9)
+        return
+    still = sfetcas.solve(beside(load, **pulled)).last
+    for step in moved:
+        # The accuracy of the motion.
+        assert step.tendon("t")["tension"] == pytest.approx(still.tendon("t")["tension"], rel=1e-4)
+        assert step.energy["elastic"] == pytest.approx(still.energy["elastic"], rel=1e-4)
+
+
+FINE = {"analysis": {"accuracy": 1e-8}}
+
+
+@pytest.mark.parametrize(
+    ("pull", "way"),
+    [
+        ({"tension": 60.0}, {}),
+        ({"pull": 0.05}, {}),
+        ({"tension": 60.0, "friction": 0.1}, {}),
+        ({"pull": 0.1, "stiffness": 1000.0}, {"discs": [0, 0.2, 0.4, 0.6, 0.8, 1]}),
+    ],
+    ids=["tension", "pull", "friction", "discs"],
+)
+def test_touching_an_obstacle(pull, way):
+    """What an obstacle gives is a force, and given as a load it leaves everything where it was."""
+    round_one = {"type": "circle", "center": [0.6, 0.25], "radius": 0.15, "member": "m"}
+    way = [{"member": "m", "offset": 0.05, **way}]
+    touching = sfetcas.solve(beside({"contacts": {"round": round_one}, **FINE}, way, **pull)).last
+    found = touching.contacts["round"]
+    force = {"type": "force", "member": "m", "at": found["at"], "value": found["force"][:2].tolist()}
+    loaded = sfetcas.solve(beside({"loads": {"f": force}, **FINE}, way, **pull)).last
+    assert np.linalg.norm(found["force"]) > 1.0
+    # The accuracy asked for.
+    np.testing.assert_allclose(touching.position("B"), loaded.position("B"), atol=1e-8)
+    assert touching.tendon("t")["length"] == pytest.approx(loaded.tendon("t")["length"], abs=1e-8)
+
+
+def test_lying_on_an_obstacle():
+    """A tendon along a member bends it as natural curvature does, also where it lies on a drum."""
+    drum = {"type": "circle", "center": [0.4, 1.001], "radius": 1.0, "member": "m"}
+    load = {"type": "force", "node": "B", "value": [-2.5, 1.5]}
+    tables = {"contacts": {"drum": drum}, "loads": {"p": load}, **FINE}
+    strung = sfetcas.solve(beside(tables, tension=14.0)).last
+    without = beside(tables, tension=14.0).to_dict()
+    del without["tendons"]
+    without["actuations"] = {"a": {"member": "m", "value": 14.0 * D / EI}}
+    bent = sfetcas.solve(Scene.from_dict(without)).last
+    assert np.ptp(strung.contacts["drum"]["at"]) > 0.01
+    np.testing.assert_allclose(strung.contacts["drum"]["at"], bent.contacts["drum"]["at"], atol=1e-8)
+    np.testing.assert_allclose(strung.position("B"), bent.position("B"), atol=1e-8)
+
+
 @pytest.mark.parametrize("pull", [{"tension": T}, {"pull": 0.01, "pushes": True}, {"pull": 0.05, "stiffness": 50.0}])
 def test_motion_of_a_pull(pull):
     """Pulled slowly, against statics: at the end it is at rest but for what the begin left."""

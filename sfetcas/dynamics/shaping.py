@@ -19,10 +19,11 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import RotationFreedom
+from ..mechanics.segments import elongation_of
 from ..mechanics.tendon_friction import settle
 from .projecting import closed
 
-__all__ = ["shaped"]
+__all__ = ["shaped", "stretched"]
 
 OPEN = 1e-3
 """Largest gap of closings, over the size of the scene or in rad, up to which a shape is closed by a small change."""
@@ -43,7 +44,7 @@ def shaped(equations: Equations, state: State, loading: Loading) -> tuple[State,
     model = equations.model
     q = _turned(model, state.q)
     state = replace(state, q=q, unwrapped=model.unwrapping.angles(q, state.unwrapped))
-    state = _placed(equations, state, loading)
+    state = stretched(equations, _placed(equations, state, loading), loading)
     gaps = np.abs(equations.at(state, loading).residual[equations.unknowns :])
     # Of elements in a row each has its share of what a loop misses.
     gap = float(gaps.sum())
@@ -58,6 +59,17 @@ def shaped(equations: Equations, state: State, loading: Loading) -> tuple[State,
     if gap > TOLD * size:
         return state, (f"the shape at t = 0 missed closings by {gap / size:.1e} of the size: it was changed to close",)
     return state, ()
+
+
+def stretched(equations: Equations, state: State, loading: Loading) -> State:
+    """The state with elastic tendons as long as their ways: what they are longer by has no inertia to keep it."""
+    model, y = equations.model, state.y.copy()
+    gaps = equations.at(state, loading).residual[equations.unknowns :]
+    for name, tendon in model.scene.tendons.items():
+        if tendon.stiffness is not None:
+            longer = model.positions.retained[model.segments.place(elongation_of(name)), 0]
+            y[longer] += gaps[equations.row_names.index(f"tendons.{name}")]
+    return replace(state, y=y)
 
 
 def _turned(model: Model, rest: Array) -> Array:

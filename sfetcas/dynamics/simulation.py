@@ -36,7 +36,7 @@ from .integrators import SHORTEST, InitialState, Integrator, Stages, TimeGrid
 from .methods import GeneralisedAlpha, Radau
 from .motion import MotionState, Mover, Trajectory
 from .sampling import StepRecord
-from .shaping import shaped
+from .shaping import shaped, stretched
 from .stages import StageEquations
 from .watching import Watch, finer
 
@@ -231,7 +231,7 @@ class Simulation:
             state, notes = posed(model, before), before.notes
         equations, factors = system.equations, system.factors(0.0)
         loading = system.loading(factors)
-        state = equations.holding(state, loading)
+        state = stretched(equations, equations.holding(state, loading), loading)
         if any(member.turned is not None for member in self.scene.members.values()):
             state, notes = shaped(equations, state, loading)
         if self.weightless:
