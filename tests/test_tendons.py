@@ -609,6 +609,15 @@ def test_touching_an_obstacle(pull, way):
     assert touching.tendon("t")["length"] == pytest.approx(loaded.tendon("t")["length"], abs=1e-8)
 
 
+def test_beside_an_obstacle_all_forces_are_rounding():
+    """A rod that its own tendon bends and that touches nothing is refused for no force that is missing."""
+    round_one = {"type": "circle", "center": [0.6, 0.25], "radius": 0.15, "member": "m"}
+    way = [{"member": "m", "offset": 0.05, "discs": [0, 0.2, 0.4, 0.6, 0.8, 1]}]
+    for tension in (0.5, 2.0, 12.0, 18.0):
+        found = sfetcas.solve(beside({"contacts": {"r": round_one}, **FINE}, way, tension=tension, friction=0.1)).last
+        assert found.contacts["r"]["at"] is None
+
+
 def test_lying_on_an_obstacle():
     """A tendon along a member bends it as natural curvature does, also where it lies on a drum."""
     drum = {"type": "circle", "center": [0.4, 1.001], "radius": 1.0, "member": "m"}
