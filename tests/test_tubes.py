@@ -492,3 +492,48 @@ def test_refused_parameters():
         sfetcas.parametric(pair(GJ=1.0), ["tubes.t.angle"], ["members.m.curvature at 0.5"])
     with pytest.raises(SceneError, match="found a number that changes the elements"):
         sfetcas.parametric(pair(GJ=1.0), ["tubes.t.start"], ["nodes.B.position"])
+
+
+# -- beside obstacles --------------------------------------------------------------------------------
+
+
+def test_touching_a_ball():
+    """What it gives is a force, and given as a load it leaves everything where it was."""
+    fine = {"accuracy": 1e-8}
+    scene = pair(GJ=1.0, rotation=1.0, analysis=fine)
+    free = sfetcas.solve(scene).last
+    # Beside the place where the tubes would be without it, off the plane of their curvature.
+    center = free.along("m", [0.8])["position"][0] + np.array([0.0, 0.02, 0.08])
+    assert np.linalg.norm(free.along("m", [0.8])["position"][0] - center) < 0.1
+    ball = {"type": "sphere", "center": center.tolist(), "radius": 0.1, "member": "m"}
+    touching = sfetcas.solve(scene.replace({"contacts.ball": ball})).last
+    found = touching.contacts["ball"]
+    load = {"type": "force", "member": "m", "at": found["at"], "value": found["force"].tolist()}
+    loaded = sfetcas.solve(scene.replace({"loads.f": load})).last
+    assert np.linalg.norm(found["force"]) > 0.01
+    # The accuracy asked for.
+    np.testing.assert_allclose(touching.position("B"), loaded.position("B"), atol=1e-8)
+    assert touching.tube("t")["torque"] == pytest.approx(loaded.tube("t")["torque"], abs=1e-7)
+
+
+def test_lying_on_a_floor():
+    """Straight tubes without loads of their own are one rod of the sum of their stiffnesses."""
+    tables = {
+        "nodes": {"A": {"position": [0, 0.05], "support": "clamped"}, "B": {"position": [1, 0.05]}},
+        "contacts": {"floor": {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "m"}},
+        "loads": {"w": {"type": "distributed", "member": "m", "value": [0, -40.0]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "own"}},
+        "analysis": {"accuracy": 1e-7},
+        "dimension": "space",
+    }
+
+    def section(share):
+        return {"EI2": share, "EI3": share, "GJ": share}
+
+    both = {"sections": {"own": section(0.4), "other": section(0.6)}, "tubes": {"t": {"members": "m", "length": 1.0}}}
+    both["tubes"]["t"]["section"] = "other"
+    tubes = sfetcas.solve(Scene.from_dict({**tables, **both})).last
+    one = sfetcas.solve(Scene.from_dict({**tables, "sections": {"own": section(1.0)}})).last
+    assert np.ptp(one.contacts["floor"]["at"]) > 0.05
+    np.testing.assert_allclose(tubes.contacts["floor"]["at"], one.contacts["floor"]["at"], atol=1e-7)
+    np.testing.assert_allclose(tubes.position("B"), one.position("B"), atol=1e-7)

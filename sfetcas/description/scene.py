@@ -520,8 +520,6 @@ def _check_tubes(scene: Scene) -> None:
             check_tube(tube, scene.nodes, scene.members, scene.sections, scene.center_lines)
         except SceneError as error:
             raise error.within("tubes", name) from None
-        if scene.contacts:
-            raise SceneError("found with contacts, accepted: without tubes", ("contacts",))
         if scene.rotating is not None:
             raise SceneError("found with tubes, accepted: without them, in axes that do not turn", ("rotating",))
         if scene.analysis.type == "dynamic" and scene.analysis.initial == "undeformed":
