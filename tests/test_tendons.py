@@ -560,6 +560,26 @@ def test_motion(pull):
     np.testing.assert_allclose(*places, atol=2e-3)
 
 
+@pytest.mark.parametrize("way", [{}, {"from": 0.2, "to": 0.8}])
+@pytest.mark.parametrize("pull", [{"tension": T}, {"pull": 0.001, "stiffness": 50.0}], ids=["tension", "stiffness"])
+def test_between_two_clamps(way, pull):
+    """What is open where a rod cannot shorten is shared as between parts that hardly stretch."""
+
+    def held(EA):
+        scene = rod([{"member": "m", "offset": 0.0, **way}], **pull)
+        table = scene.to_dict()
+        table["nodes"]["B"]["support"] = "clamped"
+        table["sections"]["s"] |= {} if EA is None else {"EA": EA}
+        return sfetcas.solve(Scene.from_dict(table)).last
+
+    stiff, stretched = held(None), held(1e9)
+    # What a stiffness of 1e9 N lets it stretch, with room for the rounding of that.
+    for end in "AB":
+        np.testing.assert_allclose(stiff.reaction(end), stretched.reaction(end), atol=1e-6)
+    x = [0.1, 0.5, 0.9]
+    np.testing.assert_allclose(stiff.along("m", x)["force"], stretched.along("m", x)["force"], atol=1e-6)
+
+
 def beside(tables, way=None, **pull):
     """The rod in the plane with further tables."""
     return Scene.from_dict({**rod(way, dimension="plane", **pull).to_dict(), **tables})

@@ -354,7 +354,10 @@ class Fields:
         return np.concatenate(found)
 
     def _along(self, member: str, x: Array, *, pressed: bool = True) -> dict[str, Array]:
-        """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted."""
+        """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted.
+
+        Force and moment are those of the section alone; ``taken`` is the force that tendons along the member carry.
+        """
         model = self.model
         part = model.elements_of(member)
         at, pull = self._stations(member, x), self._pull[part]
@@ -363,14 +366,18 @@ class Fields:
         force = _three(np.einsum("nk,nka->na", at.spread, spread[e]) - pull[e, 0])
         # m' = -r' x n; the pull at the points is minus the force there.
         moment = _summed(at, moments, self._gained(part, pull))
-        rotation = rotations_along(model, self.state.q, member, x)
+        rotation, taken = rotations_along(model, self.state.q, member, x), np.zeros_like(force)
         if stretches_of(model.scene, member):
-            about, along = self._strung(member, x, rotation, moment)
-            moment, force = moment - about, force - along
+            about, taken = self._strung(member, x, rotation, moment)
+            moment, force = moment - about, force - taken
         for touch in model.mesh.touches if pressed else ():
             if touch.member == member and touch.to is not None:
                 self._lay(touch, x, rotation, force, moment)
-        return {"position": position, "rotation": rotation, "force": force, "moment": moment}
+        return {"position": position, "rotation": rotation, "force": force, "moment": moment, "taken": taken}
+
+    def taken(self, member: str, x: Array) -> Array:
+        """Force (n, 3) that tendons along a member carry through its sections at fractions x, dimensionless."""
+        return self._along(member, x, pressed=False)["taken"]
 
     def _strung(self, member: str, x: Array, rotation: Array, moment: Array) -> tuple[Array, Array]:
         """Moment and force (n, 3) that tendons along a member carry at its sections, dimensionless."""

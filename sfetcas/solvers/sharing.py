@@ -17,6 +17,7 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, State, turned_tangents
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
+from ..mechanics.tendon_shares import stretches_of
 
 __all__ = ["SHARED", "SMALLEST", "shared", "stretches"]
 
@@ -31,6 +32,9 @@ SHARED = (
 
 SMALLEST = "reactions are not unique, the smallest are given"
 """Note of analyses in which redundant rows change no axial force."""
+
+INSIDE = 1e-9
+"""Share of an element by which points at its ends are moved into it."""
 
 MOST_LOOSE = 60
 """Largest number of redundant combinations for which reactions are made least; with more only the multipliers are."""
@@ -100,8 +104,27 @@ def _axial(equations: Equations, state: State, loading: Loading, loose: Array, r
         pulls = (pulls + equations.strings(replace(state, lam=lam), loading))[chosen]
         return np.asarray(((spread + pulls[:, None, :]) * along).sum(axis=2).ravel())
 
+    strung = [name for name in model.members if stretches_of(model.scene, name)]
+
+    def taken(lam: Array) -> Array:
+        """What tendons along members take over from their sections, which is not linear in the multipliers."""
+        found, fields = np.zeros((*acting.pull.shape[:2], 3)), Fields(equations, replace(state, lam=lam), loading)
+        for name in strung:
+            cuts, part = model.mesh.cuts[name], model.elements_of(name)
+            # Within the elements, as a tendon may begin or end between two of them.
+            within = np.clip(model.element.points, INSIDE, 1.0 - INSIDE)
+            x = cuts[:-1, None] + np.diff(cuts)[:, None] * within
+            found[part] = fields.taken(name, x.ravel()).reshape(*x.shape, 3)
+        return np.asarray((found[chosen][..., : model.element.axes] * along).sum(axis=2).ravel())
+
     own = force(state.lam, acting, acting.pull[chosen])
     gains = [force(way, nothing) for way in loose.T]
+    if strung:
+        rest = taken(state.lam)
+        own, gains = (
+            own + rest,
+            [gain + taken(state.lam + way) - rest for gain, way in zip(gains, loose.T, strict=True)],
+        )
     return own, np.array(gains).reshape(loose.shape[1], len(own)).T
 
 
