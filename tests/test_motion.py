@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from motions import FLAT, SMOOTH, THICK, cantilever, changed, moved, tip
 
+import sfetcas
+from sfetcas import Scene
 from sfetcas.mathematics import quaternion as quat
 
 pytestmark = pytest.mark.usefixtures("interpreted")
@@ -259,3 +261,22 @@ def test_a_member_cut_in_two():
     assert np.abs(tip(one) - tip(two)).max() < SAME
     # Of the error that reactions have by the step.
     assert np.abs(one.last.reaction("A")[1] - two.last.reaction("A")[1]).max() < 1e-5
+
+
+def test_forces_that_are_open_are_shared_as_in_statics():
+    """A force at 0.3 of a rod between two clamps, at rest: 0.7 of it go to the nearer one, as of a rod that stretches."""
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
+            "nodes": {
+                "A": {"position": [0, 0], "support": "clamped"},
+                "B": {"position": [1, 0], "support": "clamped"},
+            },
+            "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+            "loads": {"f": {"type": "force", "member": "m", "at": 0.3, "value": [1, 0]}},
+            "analysis": {"type": "dynamic", "end": 0.01, "initial": "equilibrium", "step": 0.005},
+        }
+    )
+    for step in sfetcas.solve(scene).steps:
+        np.testing.assert_allclose(step.reaction("A")[0], [-0.7, 0.0, 0.0], atol=1e-9)
+        np.testing.assert_allclose(step.along("m", [0.1, 0.5])["force"][:, 0], [0.7, -0.3], atol=1e-9)

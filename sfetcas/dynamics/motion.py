@@ -24,6 +24,8 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
 from ..mechanics.memory import Remembering
 from ..mechanics.model import Model
+from ..solvers.redundancy import loose_rows
+from ..solvers.sharing import shared
 from .projecting import factor_closings
 
 if TYPE_CHECKING:
@@ -46,6 +48,7 @@ class Mover:
         self.equations, self.inertia, self.time, self.factors = equations, inertia, time, factors
         self.model: Model = equations.model
         self.memory = Remembering(self.model)
+        self._redundant: bool | None = None
 
     def instant(self, sample: Sample) -> MotionState:
         """The state by name of a dimensionless sample; multipliers balance all forces in least squares."""
@@ -58,7 +61,7 @@ class Mover:
         point = equations.at(free, loading)
         forces = self.inertia.forces(sample.v, sample.a)
         balanced = self.inertia.loading(equations, free, equations.effective(free, loading), forces)
-        state = State(sample.q, sample.y, self._multipliers(equations, free, balanced), sample.unwrapped)
+        state = self._balanced(equations, free, balanced)
         fields = Fields(equations, state, balanced)
         kinetic = self.inertia.kinetic(sample.v)
         return MotionState(
@@ -73,16 +76,21 @@ class Mover:
             mover=self,
         )
 
-    @staticmethod
-    def _multipliers(equations: Equations, free: State, balanced: Any) -> Array:
-        """Internal forces that leave the least out of balance."""
+    def _balanced(self, equations: Equations, free: State, balanced: Any) -> State:
+        """The state with internal forces that leave the least out of balance, and what is open by the rule for it."""
         point, n = equations.at(free, balanced), equations.unknowns
         if not equations.rows:
-            return np.zeros(0)
+            return free
         # Least squares of the residual, rows of the closings last.
         factor_closings(equations, point)
         right = np.concatenate([-point.residual[:n], np.zeros(equations.rows)])
-        return np.asarray(equations.solver.solve(right)[n:])
+        state = replace(free, lam=np.asarray(equations.solver.solve(right)[n:]))
+        if self._redundant is False:
+            return state
+        # What is straight where it begins may be bent later, but hardly the other way round.
+        loose = loose_rows(equations, point)
+        self._redundant = bool(loose.size)
+        return shared(equations, state, balanced, loose, reactions=True) if loose.size else state
 
 
 @dataclass(frozen=True, eq=False)
