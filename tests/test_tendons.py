@@ -889,11 +889,6 @@ def test_a_pull_does_not_jump():
         rod(pull=0.01, pushes=True, analysis={"type": "dynamic", "end": 1.0})
 
 
-def test_not_with_contacts():
-    with pytest.raises(SceneError, match="contacts: found with"):
-        rod().replace(contacts={"c": {"type": "plane", "point": [0, -1], "normal": [0, 1], "member": "m"}})
-
-
 @pytest.mark.parametrize("turns", [1, 4, 8, 12])
 def test_what_winds_around_a_member_is_in_space(turns):
     """However many of its samples lie in the plane."""

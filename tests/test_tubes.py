@@ -443,7 +443,6 @@ def test_picture():
         ({"dimension": "plane"}, "dimension is set to 'plane', but tubes.t turns about the tangent"),
         ({"rotating": [0, 0, 1]}, "rotating: found with tubes, accepted: without them"),
         ({"gravity": [0, 0, 1], "sections.outer.rhoA": None}, "sections.outer: the key 'rhoA' is missing: gravity"),
-        ({"contacts.c": {"type": "plane", "point": [0, -2], "normal": [0, 1], "members": "all"}}, "without tubes"),
         (
             {"tendons.s": {"way": [{"member": "m", "offset": [0.1, 0.0]}], "tension": 1.0}},
             "members: found the member 'm', along which a tendon goes, accepted: tendons through discs",
