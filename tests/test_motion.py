@@ -264,7 +264,7 @@ def test_a_member_cut_in_two():
 
 
 def test_forces_that_are_open_are_shared_as_in_statics():
-    """A force at 0.3 of a rod between two clamps, at rest: 0.7 of it go to the nearer one, as of a rod that stretches."""
+    """At rest, of a force at 0.3 of a rod between clamps 0.7 go to the nearer one, as where it stretches."""
     scene = Scene.from_dict(
         {
             "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
