@@ -20,7 +20,7 @@ from .sections import CrossSection
 from .shapes import CenterLine
 from .structure import Member, Node
 
-__all__ = ["Run", "Tube", "check_tube", "mass_of_tubes", "runs_of", "tube_breaks"]
+__all__ = ["Run", "Tube", "check_reach", "check_tube", "mass_of_tubes", "runs_of", "tube_breaks"]
 
 
 def _names(value: Any) -> tuple[Any, ...]:
@@ -59,6 +59,11 @@ class Tube(Record):
         Further angle at factor 1.
     history : name
         Name of a history that replaces the load factor of the step.  It multiplies the ``rotation``.
+    insertion : m
+        Length by which it is pushed forward from ``start`` at factor 1; below zero it is drawn back.  Load steps come
+        one after the other then.
+    insertion_history : name
+        Name of a history that replaces the load factor of the step.  It multiplies the ``insertion``.
 
     Examples
     --------
@@ -75,6 +80,8 @@ class Tube(Record):
     angle: Number = 0.0
     rotation: Number = 0.0
     history: str | None = None
+    insertion: Number = 0.0
+    insertion_history: str | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Tube:
@@ -177,7 +184,17 @@ def check_tube(
         raise SceneError(f"the section {tube.section!r} lacks the key {missing[0]!r}: a tube needs it", ("section",))
     for one, other in pairwise(tube.members):
         _check_joined(one, other, nodes, members, lines)
-    total = sum(lines[name].length for name in tube.members)
+    check_reach(tube, sum(lines[name].length for name in tube.members))
+
+
+def check_reach(tube: Tube, total: float) -> None:
+    """Refuse a tube that reaches beyond its members, which have a length of ``total``, m, together.
+
+    Raises
+    ------
+    SceneError
+        Its place begins with a key of the tube.
+    """
     if tube.start + tube.length > total * (1.0 + tolerances.WRITTEN):
         found = f"found an end at {tube.start + tube.length:.9g} m along the members"
         accepted = f"up to their end at {total:.9g} m: the tube that reaches furthest is the member"

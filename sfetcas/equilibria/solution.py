@@ -358,6 +358,9 @@ class Equilibrium(Configuration):
         Elastic energy, and its sum with the potential of the loads, dimensionless; :attr:`energy` has them in N m.
     way : tuple of str
         The solution strategies that led to it, in their order, see :data:`~sfetcas.equilibria.ways.WAYS`.
+    snaps : tuple of float
+        Of a scene with insertions: load factors since the step before at which a state that ceased to be stable was
+        left, see :mod:`~sfetcas.equilibria.insertion_steps`.
     """
 
     certificate: Certificate
@@ -366,6 +369,7 @@ class Equilibrium(Configuration):
     strain: float
     potential: float
     way: tuple[str, ...] = ()
+    snaps: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         head = [f"factor={self.factor:g}", self.certificate.in_words]
@@ -407,7 +411,8 @@ class Equilibrium(Configuration):
             places = self.places(name)
             tables["members"][name] = {"s": places, **self.along(name, places), **found}
         proof = {"energy": self.energy, "certificate": self.certificate.to_dict()}
-        return {"factor": self.factor, **plain(tables), **proof, "notes": list(self.notes)}
+        told = {"snaps": list(self.snaps)} if self.snaps else {}
+        return {"factor": self.factor, **plain(tables), **proof, **told, "notes": list(self.notes)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -334,18 +334,25 @@ def angles_along(model: Any, tube: str, member: str, x: Array, values: Array) ->
 def angles_like(target: Any, y: Array, source: Any, values: Array) -> None:
     """Set the angles of tubes among the displacement unknowns ``y`` of one model to those of another, in place.
 
-    ``values`` are the displacement unknowns of the other model, of the same scene on another mesh.
+    ``values`` are the displacement unknowns of the other model, of the same tubes on another mesh, or elsewhere along
+    their members: beyond the ends of a tube its angles there go on.
     """
     if not target.scene.tubes:
         return
     known = source.positions.retained[:, 0]
     there = np.where(known < 0, 0.0, np.append(values, 0.0)[known])
-    for tube in target.scene.tubes:
-        for run, part, places in _runs(target, tube):
-            cuts, first = target.mesh.cuts[run.member], target.beams.first[run.member]
-            cuts = cuts[part.start - first : part.stop - first + 1]
-            x = (cuts[:-1, None] + np.diff(cuts)[:, None] * target.element.nodes).ravel()
-            found = angles_along(source, tube, run.member, x, there)[0].reshape(places.shape)
+    for name in target.scene.tubes:
+        nodal = {run.member: _nodal(places, there) for run, _, places in _runs(source, name)}
+        last = float(next(iter(nodal.values()))[0, 0])
+        for run, part, places in _runs(target, name):
+            if run.member in nodal:
+                cuts, first = target.mesh.cuts[run.member], target.beams.first[run.member]
+                cuts = cuts[part.start - first : part.stop - first + 1]
+                x = (cuts[:-1, None] + np.diff(cuts)[:, None] * target.element.nodes).ravel()
+                found = angles_along(source, name, run.member, x, there)[0].reshape(places.shape)
+                last = float(nodal[run.member][-1, -1])
+            else:
+                found = np.full(places.shape, last)
             unknown = np.where(places < 0, -1, target.positions.retained[np.maximum(places, 0), 0])
             y[unknown[unknown >= 0]] = found[unknown >= 0]
 
