@@ -102,6 +102,7 @@ ORDER = [
     "mechanics.tendon_friction",
     "mechanics.tendon_shares",
     "mechanics.tubes",
+    "mechanics.tube_fields",
     "mechanics.resistance",
     "mechanics.bodies",
     "mechanics.body_masses",

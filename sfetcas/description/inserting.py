@@ -34,6 +34,8 @@ def inserted(scene: Any, factor: float) -> Any:
     SceneError
         A tube reaches beyond its members there.
     """
+    if not scene.inserts:
+        return scene
     changes: dict[str, Any] = {}
     positions = {name: np.asarray(node.position) for name, node in scene.nodes.items()}
     for table, name, record in pushed(scene):

@@ -39,7 +39,7 @@ from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
 from .task import Analysis, Expect, Until
 from .tendons import Piece, Stretch, Tendon, Way, check_pieces, check_way, pieces_of
-from .tubes import Run, Tube, check_tube, runs_of
+from .tubes import Run, Tube, check_tube, check_turns, runs_of
 
 __all__ = [
     "Actuation",
@@ -527,6 +527,8 @@ def _check_tubes(scene: Scene) -> None:
         _known(tube.history, scene.histories, "histories", "tubes", name, "history")
         try:
             check_tube(tube, scene.nodes, scene.members, scene.sections, scene.center_lines)
+            history = None if tube.history is None else scene.histories[tube.history]
+            check_turns(tube, scene.analysis.steps if history is None else history.factor(np.array(history.t)))
         except SceneError as error:
             raise error.within("tubes", name) from None
         if scene.contacts:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any, final
 
 import numpy as np
-from pydantic import BeforeValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
@@ -20,7 +20,7 @@ from .sections import CrossSection
 from .shapes import CenterLine
 from .structure import Member, Node
 
-__all__ = ["Run", "Tube", "check_reach", "check_tube", "mass_of_tubes", "runs_of", "tube_breaks"]
+__all__ = ["Run", "Tube", "check_reach", "check_tube", "check_turns", "mass_of_tubes", "runs_of", "tube_breaks"]
 
 
 def _names(value: Any) -> tuple[Any, ...]:
@@ -28,6 +28,18 @@ def _names(value: Any) -> tuple[Any, ...]:
     if not names:
         raise ValueError("found an empty list, accepted: at least one member")
     return names
+
+
+def _angle(value: float) -> float:
+    if abs(value) > LARGEST:
+        raise ValueError(f"found {value:g}, accepted: an angle from {-LARGEST:g} to {LARGEST:g} rad")
+    return value
+
+
+LARGEST = 1e6
+"""Largest angle of a base, rad: rounding leaves 1e-10 of it, and no drive makes so many turns."""
+
+Angle = Annotated[Number, AfterValidator(_angle)]
 
 
 @final
@@ -77,8 +89,8 @@ class Tube(Record):
     start: Number = 0.0
     curvature: Turn = 0.0
     curved_from: NotNegative = 0.0
-    angle: Number = 0.0
-    rotation: Number = 0.0
+    angle: Angle = 0.0
+    rotation: Angle = 0.0
     history: str | None = None
     insertion: Number = 0.0
     insertion_history: str | None = None
@@ -185,6 +197,21 @@ def check_tube(
     for one, other in pairwise(tube.members):
         _check_joined(one, other, nodes, members, lines)
     check_reach(tube, sum(lines[name].length for name in tube.members))
+
+
+def check_turns(tube: Tube, factors: Iterable[float]) -> None:
+    """Refuse a base that ``factors`` turn beyond the largest angle.
+
+    Raises
+    ------
+    SceneError
+        Its place begins with a key of the tube.
+    """
+    for factor in factors:
+        angle = tube.angle + factor * tube.rotation
+        if abs(angle) > LARGEST:
+            accepted = f"an angle of the base from {-LARGEST:g} to {LARGEST:g} rad"
+            raise SceneError(f"found {angle:g} rad for the factor {factor:g}, accepted: {accepted}", ("rotation",))
 
 
 def check_reach(tube: Tube, total: float) -> None:

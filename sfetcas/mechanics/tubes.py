@@ -46,7 +46,9 @@ __all__ = [
     "elements_in",
     "moments_of",
     "roughness",
+    "sections_of",
     "tubes_in",
+    "twist_behind",
 ]
 
 POINT = 21
@@ -296,12 +298,27 @@ def axes_along(line: Any, run: Run, x: Array) -> tuple[Array, Array]:
 
 def _behind(scene: Any, tube: Tube) -> Any:
     """Torsional stiffness, N m, of the part of a tube behind its members."""
-    section, share = scene.sections[tube.section], -tube.start / tube.length
+    return 1.0 / _compliance(scene, tube, -tube.start)
+
+
+def _compliance(scene: Any, tube: Tube, end: Any) -> Any:
+    """Torsional compliance, 1/(N m), of a tube from its base to an arc length, m."""
+    section, share = scene.sections[tube.section], end / tube.length
     breaks = np.unique([0.0, *(x for x in section.breaks if x < share), share])
     nodes, weights = np.polynomial.legendre.leggauss(8)
     spans = np.diff(breaks)
     x = (breaks[:-1, None] + 0.5 * spans[:, None] * (1.0 + nodes)).ravel()
-    return 1.0 / (tube.length * ((0.5 * spans[:, None] * weights).ravel() / section.stiffness(x)[:, 0]).sum())
+    return tube.length * ((0.5 * spans[:, None] * weights).ravel() / section.stiffness(x)[:, 0]).sum()
+
+
+def twist_behind(scene: Any, tube: Tube, own: Array, angle: float) -> tuple[Array, Array, float]:
+    """Angle (n,), rad, and twist (n,), 1/m, behind the members of a tube, and its torque, N m.
+
+    At arc lengths (n,), m, from its base, where it is twisted by an angle, rad, up to its members.
+    """
+    torque = float(_behind(scene, tube)) * angle
+    twist = torque / scene.sections[tube.section].stiffness(own / tube.length)[:, 0]
+    return np.array([torque * float(_compliance(scene, tube, end)) if end else 0.0 for end in own]), twist, torque
 
 
 # -- of a state -------------------------------------------------------------------------------------
@@ -379,21 +396,26 @@ def moments_of(model: Any, member: str, x: Array, values: Array, bases: Mapping[
     bases : angles of the bases, rad, by the names of the tubes
     """
     stiffness, moment = np.zeros((len(x), 3, 3)), np.zeros((len(x), 3))
-    scene = model.scene
-    for name, tube in scene.tubes.items():
-        for run in scene.tube_runs[name]:
+    for name, runs in model.scene.tube_runs.items():
+        for run in runs:
             if run.member != member:
                 continue
             angle, twist, there = angles_along(model, name, member, x, values)
-            angle = angle + bases[name] - run.turned
-            own = run.begin + x * scene.center_lines[member].length
-            section = scene.sections[tube.section].stiffness_matrix(np.clip(own / tube.length, 0.0, 1.0))
-            c, s, nothing = np.cos(angle), np.sin(angle), np.zeros(len(x))
-            # Axes of the tube as columns.
-            rows = [[nothing + 1.0, nothing, nothing], [nothing, c, -s], [nothing, s, c]]
-            axes = np.moveaxis(np.array(rows), 2, 0)
-            natural = np.where((own >= tube.curved_from)[:, None], tube.vector, 0.0)
+            axes, section, natural = sections_of(model, name, run, x, angle + bases[name] - run.turned)
             natural[:, 0] -= twist
             stiffness += np.einsum("nij,njk,nlk->nil", axes, section, axes) * there[:, None, None]
             moment -= np.einsum("nij,njk,nk->ni", axes, section, natural) * there[:, None]
     return stiffness, moment
+
+
+def sections_of(model: Any, name: str, run: Run, x: Array, angle: Array) -> tuple[Array, Array, Array]:
+    """Axes of a tube as columns (n, 3, 3), about those of the member, stiffness (n, 3, 3), N m2, and natural curvature
+    (n, 3), 1/m, at fractions x (n,) of the length of a member against which it is turned by angles (n,), rad.
+    """
+    tube, scene = model.scene.tubes[name], model.scene
+    own = run.begin + x * scene.center_lines[run.member].length
+    section = scene.sections[tube.section].stiffness_matrix(np.clip(own / tube.length, 0.0, 1.0))
+    c, s, nothing = np.cos(angle), np.sin(angle), np.zeros(len(x))
+    rows = [[nothing + 1.0, nothing, nothing], [nothing, c, -s], [nothing, s, c]]
+    natural = np.where((own >= tube.curved_from)[:, None], tube.vector, 0.0)
+    return np.moveaxis(np.array(rows), 2, 0), section, natural
