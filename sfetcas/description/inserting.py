@@ -174,7 +174,7 @@ def _check_reaches(scene: Any) -> None:
                     there: Tube = tube.replace(start=tube.start + gone_to(scene, tube, factor), insertion=0.0)
                     check_reach(there, sum(now[member] for member in tube.members))
                 except SceneError as error:
-                    raise SceneError(f"at factor {factor:.6g}: {error}", ("tubes", name, "insertion")) from None
+                    raise SceneError(f"at factor {factor:.6g} {error.bare}", ("tubes", name, "insertion")) from None
 
 
 def gone_to(scene: Any, record: Any, factor: float) -> float:

@@ -1,0 +1,314 @@
+"""Tubes and members pushed out step after step: closed forms, shooting, snaps where the pendulum has them, hysteresis."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, root
+from test_tubes import TUBES, pair, robot, shot, twins
+
+import sfetcas
+from sfetcas import SceneError, SolveError
+from sfetcas.cli import main
+from sfetcas.equilibria.quantities import value_of
+
+# -- closed forms ------------------------------------------------------------------------------------
+
+
+def arcs(*parts):
+    """End of arcs (length, curvature), one after the other from the origin along x."""
+    place, angle = np.zeros(2), 0.0
+    for length, bend in parts:
+        turned = angle + bend * length
+        if bend:
+            place = place + np.array([np.sin(turned) - np.sin(angle), np.cos(angle) - np.cos(turned)]) / bend
+        else:
+            place = place + length * np.array([np.cos(angle), np.sin(angle)])
+        angle = turned
+    return np.array([*place, 0.0])
+
+
+def test_a_straight_member_is_bent_by_the_part_of_a_tube_that_is_in_front():
+    """By two thirds of its curvature: each step of a sequence outwards and back."""
+    task = {"steps": [0.25, 1.0, 0.5], "accuracy": 1e-9}
+    scene = pair(own=0.0, GJ=1.0, length=0.6, start=-0.2, curved_from=0.1, insertion=0.5, analysis=task)
+    for step in sfetcas.solve(scene).steps:
+        base = -0.2 + 0.5 * step.factor
+        begin, end = max(base + 0.1, 0.0), base + 0.6
+        expected = arcs((begin, 0.0), (end - begin, 2.0), (1.0 - end, 0.0))
+        np.testing.assert_allclose(step.position("B"), expected, atol=1e-9)
+        assert step.certificate.stable
+        assert not step.snaps
+
+
+def test_a_member_grows_out_of_its_clamp():
+    """A cantilever under its weight and an end force becomes longer: each step is that of the longer one."""
+    scene = sfetcas.Scene.from_dict(
+        {
+            "gravity": [0, -2.0],
+            "sections": {"s": {"EI3": 1.0, "rhoA": 0.5}},
+            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [0.5, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s", "insertion": 1.0, "insertion_history": "out"}},
+            "loads": {"f": {"type": "force", "node": "B", "value": [0, -1.0], "history": "still"}},
+            "histories": {"out": {"t": [0, 2, 3], "value": [0, 1, 0.2]}, "still": {"t": [0, 1], "value": [1, 1]}},
+            "analysis": {"steps": [1, 2, 3], "accuracy": 1e-8},
+        }
+    )
+    for step, length in zip(sfetcas.solve(scene).steps, [1.0, 1.5, 0.7], strict=True):
+        # Gravity grows with the factor: theta'' = (weight (length - s) + force) cos(theta).
+        weight = 2.0 * 0.5 * step.factor
+
+        def rate(s, y, weight=weight, length=length):
+            return [y[1], (weight * (length - s) + 1.0) * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])]
+
+        def shot_from(bend, rate=rate, length=length):
+            return solve_ivp(rate, [0, length], [0.0, bend, 0.0, 0.0], rtol=1e-11, atol=1e-12).y[:, -1]
+
+        end = shot_from(brentq(lambda bend: shot_from(bend)[1], -9.0, 0.0, xtol=1e-13))
+        np.testing.assert_allclose(step.position("B"), [end[2], end[3], 0.0], atol=1e-8)
+
+
+# -- two equal tubes: a pendulum whose length grows ----------------------------------------------------
+
+TURN, BEHIND = 2.0, 0.9
+"""sqrt(c) of the pendulum theta'' = c sin(theta) of two equal tubes, 1/m, and length behind the members at first, m."""
+
+
+def sliding(**changes):
+    """Two equal tubes, one metre long, of which one is pushed in from behind the members by 0.9 m."""
+    slides = {"tubes.t.rotation": 0.0, "tubes.t.start": -BEHIND, "tubes.t.insertion": BEHIND, "members.m.elements": 4}
+    return twins(TURN).replace({**slides, **changes})
+
+
+def test_opposed_tubes_part_where_the_pendulum_buckles():
+    """They stay opposed until sqrt(c) tan(sqrt(c) L) = 2 / a, with the length L in each other and a behind.
+
+    A straight one part of the tube twists behind the members: it takes part with its whole stiffness, the pair with half.
+    """
+    behind = brentq(lambda a: TURN * np.tan(TURN * (1.0 - a)) - 2.0 / a, 0.25, 0.6)
+    solution = sfetcas.solve(sliding(**{"tubes.t.angle": np.pi, "analysis.steps": [0.7, 0.5]}))
+    parted, again = solution.steps
+    # Elements of a quarter of the length leave 1e-8 of eigenvalues.
+    assert parted.snaps == pytest.approx([1.0 - behind / BEHIND], abs=1e-7)
+    assert "snapped at factor 0.54609" in parted.notes[0]
+    assert "tubes.t.insertion 0.49148" in parted.notes[0]
+    # Drawn back they come together again, at the same place and without a snap.
+    assert not again.snaps
+    alone = sfetcas.solve(again.model.scene.replace({"analysis.steps": [0.5]})).last
+    np.testing.assert_allclose(again.position("B"), alone.position("B"), atol=1e-7)
+    assert again.tube("t")["angle"] == pytest.approx(np.pi, abs=1e-5)
+    assert abs(parted.tube("t")["angle"] - np.pi) > 1.0
+    assert all(step.certificate.stable is True for step in solution.steps)
+    assert json.loads(json.dumps(solution.to_dict()))["steps"][0]["snaps"] == list(parted.snaps)
+
+
+def base_angle(end, length):
+    """Angle of a base that holds the front at an angle, and its derivative by that, with the twist behind."""
+
+    def rate(s, y):
+        return [y[1], TURN**2 * np.sin(y[0]), y[3], TURN**2 * np.cos(y[0]) * y[2]]
+
+    y = solve_ivp(rate, [0, length], [end, 0.0, 1.0, 0.0], rtol=1e-12, atol=1e-14).y[:, -1]
+    behind = 1.0 - length
+    return y[0] + 0.5 * behind * y[1], y[2] + 0.5 * behind * y[3]
+
+
+def test_hysteresis_of_an_insertion():
+    """Pushed in, turned beyond half a turn, drawn out: there the pair snaps, and pushed in again it does not go back."""
+    angle = 3.3
+    histories = {
+        "histories.turn": {"t": [0, 1, 2], "value": [0, 0, 1]},
+        "histories.push": {"t": [0, 1, 2, 3, 4], "value": [0, 1, 1, 0.5, 1]},
+        "tubes.t.rotation": angle,
+        "tubes.t.history": "turn",
+        "tubes.t.insertion_history": "push",
+    }
+    inside, turned, out, again = sfetcas.solve(sliding(**histories, **{"analysis.steps": [1, 2, 3, 4]})).steps
+    assert inside.tube("t")["angle"] == pytest.approx(0.0, abs=1e-9)
+    # The fold: no change of the base angle with that of the front.
+    fold = root(lambda u: np.subtract(base_angle(*u), (angle, 0.0)), [1.9, 0.9], tol=1e-13)
+    assert fold.success
+    pushed = 1.0 - (1.0 - fold.x[1]) / BEHIND
+    assert [step.snaps for step in (inside, turned, again)] == [(), (), ()]
+    # Of the halves of the elements that are followed 1e-8 is left.
+    assert out.snaps == pytest.approx([2.0 + (1.0 - pushed) / 0.5], abs=1e-7)
+    # The same pose twice, on either branch.
+    for step, side in ((turned, -1.0), (again, 1.0)):
+        end = step.tube("t")["angle"]
+        assert side * (end - np.pi) > 1.0
+        assert base_angle(end, 1.0)[0] == pytest.approx(angle, abs=1e-5)
+        assert step.certificate.stable is True
+
+
+def test_an_unstable_state_may_be_kept_and_a_fold_ends_the_way():
+    """With unstable = "stay" opposed tubes stay opposed; at a fold there is nothing to stay at."""
+    task = {"steps": [0.5, 0.7], "unstable": "stay"}
+    kept = sfetcas.solve(sliding(**{"tubes.t.angle": np.pi, "analysis": task})).last
+    assert kept.certificate.negative == 1
+    assert kept.tube("t")["angle"] == pytest.approx(np.pi, abs=1e-9)
+    histories = {
+        "histories.turn": {"t": [0, 1, 2], "value": [0, 0, 1]},
+        "histories.push": {"t": [0, 1, 2, 3], "value": [0, 1, 1, 0.5]},
+        "tubes.t.rotation": 3.3,
+        "tubes.t.history": "turn",
+        "tubes.t.insertion_history": "push",
+    }
+    with pytest.raises(SolveError, match=r"at factor 3: .* not be followed beyond factor 2\.3637.*insertion 0\.7363"):
+        sfetcas.solve(sliding(**histories, **{"analysis": {"steps": [2, 3], "unstable": "stay"}}))
+
+
+# -- three tubes ---------------------------------------------------------------------------------------
+
+FORCE = (0.0, 0.1, -0.2)
+
+
+def advanced(second=0.03, third=0.06):
+    """A robot whose tubes are all pushed out, each at its own rate, and partly drawn back."""
+    histories = {"all": {"t": [0, 1, 2], "value": [0, 1, 0.3]}, "still": {"t": [0, 1], "value": [1, 1]}}
+    pushed = {"tubes.two.insertion": second, "tubes.three.insertion": third, "members.shaft.insertion": 0.02}
+    named = {name.replace("insertion", "insertion_history"): "all" for name in pushed}
+    held = {f"histories.{name}": history for name, history in histories.items()} | {"loads.f.history": "still"}
+    return robot(FORCE).replace({**pushed, **named, **held, "analysis": {"steps": [0.4, 1.0, 2.0], "accuracy": 1e-8}})
+
+
+def test_three_tubes_pushed_out_by_shooting():
+    """Both bases come to the end of their guide, a front passes the node between two members, and the shaft grows."""
+    for step, share in zip(sfetcas.solve(advanced()).steps, [0.4, 1.0, 0.3], strict=True):
+        tip, fronts, _ = shot(FORCE, (0.03 * share, 0.06 * share), 0.02 * share)
+        assert not step.snaps
+        np.testing.assert_allclose(step.position("tip"), tip, atol=1e-8)
+        np.testing.assert_allclose([step.tube(name)["angle"] for name in TUBES], fronts, atol=1e-6)
+
+
+def test_each_step_is_the_scene_by_itself():
+    """Whatever the way there, as nothing snaps, also with bases that have left their guide."""
+    for step in sfetcas.solve(advanced(0.045, 0.07)).steps:
+        own = step.model.scene
+        assert not own.inserts
+        alone = sfetcas.solve(own.replace({"analysis.steps": [step.factor]})).last
+        np.testing.assert_allclose(step.position("tip"), alone.position("tip"), atol=1e-8)
+        for name in TUBES:
+            assert step.tube(name) == pytest.approx(alone.tube(name), abs=1e-6)
+
+
+# -- along tubes ---------------------------------------------------------------------------------------
+
+
+def test_tubes_tell_what_they_carry_along_their_length():
+    """Against shooting: turn and twist of both tubes at a section; nothing at the front, a constant torque behind."""
+    step, where = sfetcas.solve(robot(FORCE), accuracy=1e-8).last, 0.07
+    reached = shot(FORCE, at=where)[2]
+    for i, (name, tube) in enumerate(TUBES.items(), start=1):
+        share = (where - tube["start"]) / tube["length"]
+        found = step.along_tube(name, [0.0, 0.01, share, 1.0])
+        # Derivatives of angles are of lower order than these.
+        assert found["turn"][2] == pytest.approx(reached[i], abs=1e-7)
+        assert found["curvature"][2, 0] == pytest.approx(reached[3 + i], abs=1e-4)
+        torque, told = found["moment"][:, 0], step.tube(name)
+        np.testing.assert_allclose(torque[:2], -told["torque"], rtol=1e-6)
+        assert torque[3] == pytest.approx(0.0, abs=1e-5 * abs(torque[0]))
+        assert found["turn"][0] == tube["angle"]
+        assert found["turn"][3] == pytest.approx(told["angle"], abs=1e-12)
+        assert value_of(step, f"tubes.{name}.moment.b1 at 0.01") == pytest.approx(torque[1], rel=1e-9)
+        # Strain energy: half the moments times what they bend, from one end to the other.
+        listed = step.to_dict()["tubes"][name]
+        at, moments = (np.array(listed[key]) for key in ("s", "moment"))
+        assert at[0] == 0.0
+        assert at[-1] == 1.0
+        section = step.model.scene.sections[tube["section"]]
+        x, w = np.polynomial.legendre.leggauss(6)
+        energy = 0.0
+        for a, b in zip(at, at[1:], strict=False):
+            moments = step.along_tube(name, a + (b - a) * (0.5 + 0.5 * x))["moment"]
+            firm = np.array([section.GJ, section.EI2, section.EI3])
+            energy += 0.25 * (b - a) * tube["length"] * w @ (moments**2 / firm).sum(axis=1)
+        assert energy == pytest.approx(told["energy"], rel=1e-5)
+
+
+def test_all_tubes_together_carry_the_section_moment():
+    """Turned into the axes of the member, with the moment of the member itself."""
+    step, x = sfetcas.solve(robot(FORCE, b2=[0.0, 0.6, 0.8]), accuracy=1e-7).last, np.array([0.2, 0.35])
+    line, found = step.model.scene.center_lines["end"], step.along("end", x)
+    own = sfetcas.mathematics.quaternion.multiply(found["quaternion"], line.quaternions(x))
+    frames = sfetcas.mathematics.quaternion.matrix(own)
+    section = step.model.scene.sections["one"].stiffness_matrix(x)
+    total = np.einsum("nij,nj->ni", section, found["curvature"] - line.curvatures(x))
+    (run,) = [run for run in step.model.scene.tube_runs["two"] if run.member == "end"]
+    inside = x < run.end
+    assert inside.all()
+    told = step.along_tube("two", (run.begin + x * line.length) / TUBES["two"]["length"])
+    angle = told["turn"] - run.turned
+    c, s = np.cos(angle), np.sin(angle)
+    torque, second, third = told["moment"].T
+    total += np.stack([torque, c * second - s * third, s * second + c * third], axis=1)
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", frames, total), found["moment"], atol=1e-9)
+
+
+# -- what is refused, and what shows it ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"tubes.t.insertion": 0.6}, "tubes.t.insertion: at factor 0.875 found an end at 1.025 m along"),
+        ({"tubes.t.insertion": -0.6}, "tubes.t.insertion: at factor 0.875 found a base at -0.525 m and a length of"),
+        ({"tubes.t.insertion_history": "h"}, "tubes.t.insertion_history: found 'h', accepted: none, as the scene has"),
+        ({"analysis.type": "modes"}, "found with the analysis 'modes', accepted: 'static', whose steps follow it"),
+        ({"analysis": {"type": "path", "range": [0, 1]}}, "found with the analysis 'path', accepted: 'static'"),
+        ({"analysis": {"type": "dynamic", "end": 1, "initial": "equilibrium"}}, "the analysis 'dynamic', accepted"),
+        ({"analysis.equilibria": "all"}, "analysis.equilibria: found 'all', accepted: 'one' with tubes.t.insertion"),
+        ({"members.m.insertion": 0.1, "members.m.shape": {"type": "arc", "angle": 1}}, "of the shape 'arc', accepted"),
+        ({"members.m.insertion": -2.0, "tubes.t.insertion": 0}, "tubes.t.insertion: at factor 0.3125 found"),
+        ({"members.m.insertion": 0.1, "nodes.B.support": "ball"}, "the node 'B' beyond it, which the ground holds"),
+        ({"members.m.insertion": 0.1, "nodes.A.support": "ball"}, "the first node 'A', accepted: a clamped one"),
+        ({"members.m.insertion": 0.1, "sections.inner.EI3": {"at": [0, 1], "value": [1, 2]}}, "which varies along"),
+        (
+            {"members.m.insertion": 0.1, "loads.g": {"type": "force", "member": "m", "at": 0.5, "value": [0, 1]}},
+            "found the load 'g' on a part of it, accepted: nothing that keeps its place on a member that grows",
+        ),
+        (
+            {
+                "histories.h": {"t": [0, 1, 2], "polynomial": [[0, 0.5], [0.8, 0.1]]},
+                "tubes.t.insertion_history": "h",
+            },
+            "tubes.t.insertion_history: found 'h', which jumps, accepted: a history without jumps",
+        ),
+        ({"tubes.t.angle": 1e30}, "tubes.t.angle: found 1e+30, accepted: an angle from -1e+06 to 1e+06 rad"),
+        ({"tubes.t.rotation": 2.0, "analysis.steps": [1e7]}, "tubes.t.rotation: found 2e+07 rad for the factor 1e+07"),
+    ],
+)
+def test_refused(changes, words):
+    """Each with a sentence that names it."""
+    with pytest.raises(SceneError) as refused:
+        pair(own=0.0, length=0.5, insertion=0.1).replace(changes)
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda s: sfetcas.parametric(s, ["tubes.t.angle"], ["nodes.B.position"]),
+        lambda s: sfetcas.export(s, "never", arguments=["tubes.t.angle"]),
+        lambda s: sfetcas.assemble(s, sfetcas.first_mesh(s, 4)),
+        lambda s: sfetcas.Design(s),
+    ],
+    ids=["parametric", "export", "assemble", "design"],
+)
+def test_what_knows_no_steps(call):
+    """What knows one pose only refuses one that changes from step to step."""
+    with pytest.raises(SceneError, match=r"tubes.t.insertion: found 0.1, .* knows no steps, accepted: solve"):
+        call(pair(own=0.0, length=0.5, insertion=0.1))
+
+
+def test_pictures_and_texts_are_of_each_step(tmp_path, capsys):
+    """The band of a tube is where it is then; ``sfetcas info`` shows the scene before."""
+    pytest.importorskip("matplotlib").use("Agg")
+    from test_plotting import drawn
+
+    scene = pair(own=0.0, other=0.0, GJ=1.0, length=0.5, insertion=0.4)
+    (line,) = drawn(sfetcas.solve(scene).last.plot(), "tube-t")
+    assert [line[0, 0], line[-1, 0]] == pytest.approx([0.4, 0.9], abs=1e-6)
+    (tmp_path / "scene.json").write_text(json.dumps(scene.to_dict()))
+    assert main(["info", str(tmp_path / "scene.json")]) == 0
+    assert "member m: " in capsys.readouterr().out
