@@ -213,6 +213,7 @@ ORDER = [
     "paths.paths",
     "parametric",
     "parametric.results",
+    "parametric.sliding_tubes",
     "parametric.arguments",
     "parametric.changing",
     "parametric.equilibrium",

@@ -1,4 +1,4 @@
-"""Tubes and members pushed out step after step: closed forms, shooting, snaps where the pendulum has them, hysteresis."""
+"""Tubes and members pushed out step after step: closed forms, shooting, snaps of a pendulum, hysteresis."""
 
 import json
 
@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
+from test_codegen import built, needs_compiler, said
 from test_tubes import TUBES, pair, robot, shot, twins
 
 import sfetcas
 from sfetcas import SceneError, SolveError
 from sfetcas.cli import main
 from sfetcas.equilibria.quantities import value_of
+from sfetcas.solvers.globalised import Code
 
 # -- closed forms ------------------------------------------------------------------------------------
 
@@ -84,7 +86,7 @@ def sliding(**changes):
 def test_opposed_tubes_part_where_the_pendulum_buckles():
     """They stay opposed until sqrt(c) tan(sqrt(c) L) = 2 / a, with the length L in each other and a behind.
 
-    A straight one part of the tube twists behind the members: it takes part with its whole stiffness, the pair with half.
+    Behind the members a tube twists with its whole stiffness, where two are in each other with half of it.
     """
     behind = brentq(lambda a: TURN * np.tan(TURN * (1.0 - a)) - 2.0 / a, 0.25, 0.6)
     solution = sfetcas.solve(sliding(**{"tubes.t.angle": np.pi, "analysis.steps": [0.7, 0.5]}))
@@ -115,7 +117,7 @@ def base_angle(end, length):
 
 
 def test_hysteresis_of_an_insertion():
-    """Pushed in, turned beyond half a turn, drawn out: there the pair snaps, and pushed in again it does not go back."""
+    """Pushed in, turned beyond half a turn, drawn out: there the pair snaps, and pushed in again it stays snapped."""
     angle = 3.3
     histories = {
         "histories.turn": {"t": [0, 1, 2], "value": [0, 0, 1]},
@@ -243,6 +245,86 @@ def test_all_tubes_together_carry_the_section_moment():
     torque, second, third = told["moment"].T
     total += np.stack([torque, c * second - s * third, s * second + c * third], axis=1)
     np.testing.assert_allclose(np.einsum("nij,nj->ni", frames, total), found["moment"], atol=1e-9)
+
+
+# -- where a tube begins as a parameter -----------------------------------------------------------------
+
+
+def heavy():
+    """The robot with weight and the force at its tip."""
+    masses = {"sections.one.rhoA": 2.0, "sections.two.rhoA": 3.0, "sections.three.rhoA": 5.0}
+    return robot(FORCE).replace({"gravity": [0, 0, -9.81], **masses, "analysis.accuracy": 1e-7})
+
+
+def test_the_start_of_a_tube_is_a_parameter():
+    """Ends of elements go along, and with them mass, twist behind and all that is told; the derivative is exact."""
+    asked = ["nodes.tip.position", "tubes.two.torque", "tubes.two.angle", "tubes.two.energy"]
+    ranges = {"tubes.two.start": (-0.055, -0.025), "tubes.three.start": (-0.07, -0.05)}
+    family = sfetcas.parametric(heavy(), ranges, asked)
+    at = {"tubes.two.start": -0.045, "tubes.three.start": -0.055}
+    answer, step = family.solve(at), sfetcas.solve(heavy().replace(at)).last
+    np.testing.assert_allclose(np.ravel(answer["nodes.tip.position"]), step.position("tip"), atol=1e-8)
+    for key, value in step.tube("two").items():
+        assert float(np.ravel(answer[f"tubes.two.{key}"])[0]) == pytest.approx(value, rel=1e-5)
+    near = [
+        np.ravel(family.solve(at | {"tubes.two.start": start})["nodes.tip.position"]) for start in (-0.04501, -0.04499)
+    ]
+    # Central differences of 0.01 mm, whose error falls with its square: 3e-7 here.
+    told = answer.jacobian["nodes.tip.position"]["tubes.two.start"]
+    np.testing.assert_allclose(np.ravel(told), (near[1] - near[0]) / 2e-5, rtol=2e-6)
+
+
+def test_a_design_finds_how_far_a_tube_lies():
+    """From the place of the tip back to the start that leads to it, along the member."""
+    scene = pair(own=0.0, GJ=1.0, length=0.5, start=0.2, curved_from=0.1, dead=[0, 0, 0.2])
+    wanted = sfetcas.solve(scene.replace({"tubes.t.start": 0.31}), accuracy=1e-8).last.position("B")
+    design = sfetcas.Design(scene, {"tubes.t.start": (0.02, 0.4)})
+    design.subject_to(design.answer("", "nodes.B.position")[1] == wanted[1])
+    # The accuracy of the design over the slope of the place by the start, 0.8.
+    assert design.solve().values["tubes.t.start"] == pytest.approx(0.31, abs=1e-4)
+
+
+@needs_compiler
+def test_exported_code(tmp_path):
+    """The program in C takes the start of a tube."""
+    scene = pair(own=0.0, GJ=1.0, length=0.5, start=0.2, curved_from=0.1, analysis={"accuracy": 1e-4})
+    solver = sfetcas.export(scene, tmp_path / "c", name="c", arguments=["tubes.t.start"], results=["nodes.B.position"])
+    outcome, found = solver.solve([0.31])
+    assert outcome.code is Code.SOLVED
+    np.testing.assert_allclose(found, arcs((0.41, 0.0), (0.4, 2.0), (0.19, 0.0)), atol=1e-4)
+    assert "cases agree" in said(built(tmp_path / "c", "c"))
+
+
+@pytest.mark.parametrize(
+    ("changes", "asked", "words"),
+    [
+        ({"tubes.t.start": 0.0}, "tubes.t.start", "found 0, with which the tube begins, ends or becomes curved at 0 m"),
+        ({"tubes.t.start": 0.5}, "tubes.t.start", "becomes curved at 1 m along its members, where something else does"),
+        (
+            {"sections.outer.GJ": {"at": [0, 1], "value": [1, 2]}},
+            "tubes.t.start",
+            "varies along it, accepted: one with",
+        ),
+        ({}, "tubes.t.length", "found a number that changes the elements, and with them the unknowns"),
+        ({}, "tubes.t.insertion", "found a number that changes the elements, and with them the unknowns"),
+        ({}, "members.m.insertion", "found a number that changes the elements, and with them the unknowns"),
+    ],
+)
+def test_refused_parameters(changes, asked, words):
+    """Where ends of elements would meet, or the section would be another one at each place."""
+    with pytest.raises(SceneError) as refused:
+        sfetcas.parametric(pair(length=0.5, start=0.2).replace(changes), [asked], ["nodes.B.position"])
+    assert words in str(refused.value)
+
+
+def test_refused_ranges():
+    """Tubes that might meet, starts beyond what is beside them, and places within elements that move."""
+    with pytest.raises(SceneError, match=r"found tubes.three.start and tubes.two.start, which may meet, accepted"):
+        sfetcas.parametric(robot(), ["tubes.two.start", "tubes.three.start"], ["nodes.tip.position"])
+    with pytest.raises(SceneError, match=r"found -0.2 to 0.1, accepted: a range between -0.07 and -0.01"):
+        sfetcas.parametric(robot(), {"tubes.two.start": (-0.2, 0.1)}, ["nodes.tip.position"])
+    with pytest.raises(SceneError, match=r"along a member on which a load or a tube moves, accepted: answers of nodes"):
+        sfetcas.parametric(robot(), ["tubes.two.start"], ["members.end.position at 0.5"])
 
 
 # -- what is refused, and what shows it ------------------------------------------------------------------

@@ -496,4 +496,4 @@ def test_refused_parameters():
     with pytest.raises(SceneError, match="found the curvature along a member with tubes, accepted: its position"):
         sfetcas.parametric(pair(GJ=1.0), ["tubes.t.angle"], ["members.m.curvature at 0.5"])
     with pytest.raises(SceneError, match="found a number that changes the elements"):
-        sfetcas.parametric(pair(GJ=1.0), ["tubes.t.start"], ["nodes.B.position"])
+        sfetcas.parametric(pair(GJ=1.0), ["tubes.t.length"], ["nodes.B.position"])
