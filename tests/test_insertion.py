@@ -13,6 +13,10 @@ import sfetcas
 from sfetcas import SceneError, SolveError
 from sfetcas.cli import main
 from sfetcas.equilibria.quantities import value_of
+from sfetcas.mechanics.fields import transferred
+from sfetcas.mechanics.mesh import first_mesh
+from sfetcas.mechanics.model import assemble
+from sfetcas.mechanics.tubes import angles_along
 from sfetcas.solvers.globalised import Code
 
 # -- closed forms ------------------------------------------------------------------------------------
@@ -69,6 +73,26 @@ def test_a_member_grows_out_of_its_clamp():
 
         end = shot_from(brentq(lambda bend: shot_from(bend)[1], -9.0, 0.0, xtol=1e-13))
         np.testing.assert_allclose(step.position("B"), [end[2], end[3], 0.0], atol=1e-8)
+
+
+def test_a_column_that_grows_buckles_at_its_critical_length():
+    """Euler's column, at pi / 2 times the root of stiffness over load; drawn in again it is straight again."""
+    scene = sfetcas.Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0}},
+            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s", "insertion": 1.0, "insertion_history": "out"}},
+            "loads": {"f": {"type": "force", "node": "B", "value": [-1, 0], "history": "still"}},
+            "histories": {"out": {"t": [0, 1, 2], "value": [0, 1, 0]}, "still": {"t": [0, 1], "value": [1, 1]}},
+            "analysis": {"steps": [0.7, 2]},
+        }
+    )
+    buckled, again = sfetcas.solve(scene).steps
+    # Rounding counts an eigenvalue as negative only below 3e-8 of those of the column.
+    assert buckled.snaps == pytest.approx([0.5 * np.pi - 1.0], abs=1e-7)
+    assert buckled.position("B")[1] < -0.5
+    assert not again.snaps
+    np.testing.assert_allclose(again.position("B"), [1.0, 0.0, 0.0], atol=1e-9)
 
 
 # -- two equal tubes: a pendulum whose length grows ----------------------------------------------------
@@ -198,6 +222,19 @@ def test_three_tubes_pushed_out_by_shooting(shares):
         assert not step.snaps
         np.testing.assert_allclose(step.position("tip"), tip, atol=1e-8)
         np.testing.assert_allclose([step.tube(name)["angle"] for name in TUBES], fronts, atol=1e-6)
+
+
+def test_the_angle_of_a_front_goes_on_along_the_next_member():
+    """Carried to where a tube has just passed a node, all of it is turned there as its front was before."""
+    before, after = (robot().replace({"tubes.three.start": -0.04 + side * 1e-7}) for side in (-1.0, 1.0))
+    step = sfetcas.solve(before).last
+    target = assemble(after, first_mesh(after, 4))
+    state = transferred(step.model, step.state, target)
+    angles = np.append(state.y, 0.0)[target.positions.retained[:, 0]]
+    base = TUBES["three"]["angle"]
+    found, _, there = angles_along(target, "three", "end", np.array([0.0, 5e-7]), angles)
+    assert there.all()
+    np.testing.assert_allclose(found, step.tube("three")["angle"] - base, atol=1e-6)
 
 
 def test_each_step_is_the_scene_by_itself():

@@ -100,7 +100,9 @@ class _Way:
         tries = int(TRIES * (1.0 + effort))
         here, reached = advanced(_On(found, 0.0), 0.25, self.trial, lambda here: here.done >= 1.0, tries=tries)
         if not reached:
-            detail = f"the tubes could not be followed beyond {self.steps.place(self.factor(here.done))}: {ENDS}"
+            detail = (
+                f"what is pushed out could not be followed beyond {self.steps.place(self.factor(here.done))}: {ENDS}"
+            )
             raise SolveError(Status.FAILED, detail, here.found.state)
         return here.found
 
