@@ -71,8 +71,9 @@ class _On:
 class _Way:
     """The way from one load factor to another between which no history has a knot.
 
-    ``blocked`` is the nearest part of the way known to which no step led; ``regular`` is the last equilibrium that a
-    step brought that was not short; ``snaps`` are the factors of those passed.
+    ``blocked`` is the nearest part of the way known to which no step led, ``longest`` the part that a step may take, and
+    ``halved`` says whether the last one was halved.  ``regular`` is the last equilibrium that a step brought that was
+    not short; ``snaps`` are the factors of those passed.
     """
 
     steps: InsertionSteps
@@ -80,6 +81,7 @@ class _Way:
     end: float
     blocked: float = np.inf
     longest: float = 1.0
+    halved: bool = False
     regular: Solved | None = None
     snaps: list[float] = field(default_factory=list)
 
@@ -134,9 +136,13 @@ class _Way:
         if there is not None:
             self.blocked = np.inf if done >= self.blocked else self.blocked
             self.regular = self.regular if short else there
-            return _On(there, done), length * (2.0 if linear else 1.0)
+            # What was just halved is not doubled at once.
+            grown = length * (2.0 if linear and not self.halved else 1.0)
+            self.halved = False
+            return _On(there, done), grown
         self.blocked = min(self.blocked, done) if self.blocked > here.done else done
         if length > LOCATED:
+            self.halved = True
             return None, 0.5 * length
         return self._snapped(here, done)
 
