@@ -71,7 +71,7 @@ class _On:
 class _Way:
     """The way from one load factor to another between which no history has a knot.
 
-    ``blocked`` is the nearest part of the way known to which no step led, ``longest`` the part that a step may take, and
+    ``blocked`` is the nearest part of the way known to which no step led, ``longest`` the part that a step takes, and
     ``halved`` says whether the last one was halved.  ``regular`` is the last equilibrium that a step brought that was
     not short; ``snaps`` are the factors of those passed.
     """
