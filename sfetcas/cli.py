@@ -22,6 +22,7 @@ import numpy as np
 from . import __version__
 from .analyses import solve
 from .checks import Answer, Check, check
+from .description.inserting import inserted
 from .description.records import counted
 from .description.scene import Scene
 from .description.scenefile import load
@@ -533,6 +534,8 @@ def _check(options: argparse.Namespace) -> int:
 def _info(options: argparse.Namespace) -> int:
     scene, settings = load(options.file), _settings(options)
     _named(options.file, lambda: check_resistance(scene))
+    # What is pushed out is shown as it is before.
+    scene = inserted(scene, 0.0)
     mesh = pilot_of(scene, settings)
     model = assemble(scene, mesh, assembly=settings.assembly)
     print(printable(scene.title) or "untitled scene")

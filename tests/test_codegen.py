@@ -32,11 +32,15 @@ PROBLEMS = Path(__file__).parent.parent / "problems"
 
 
 def is_static(file):
-    """Without contacts and slack tendons; by the text, as making scenes of all at each start of tests takes seconds."""
+    """One pose, without contacts and slack tendons.
+
+    By the text, as making scenes of all at each start of tests takes seconds.
+    """
     table = tomllib.loads(file.read_text(encoding="utf-8"))
     measured = [{"pull", "length"} & set(t) and not t.get("pushes") for t in table.get("tendons", {}).values()]
     static = table.get("analysis", {}).get("type", "static") == "static"
-    return static and "contacts" not in table and not any(measured)
+    pushed = any("insertion" in record for kind in ("tubes", "members") for record in table.get(kind, {}).values())
+    return static and "contacts" not in table and not any(measured) and not pushed
 
 
 STATIC = [file for file in sorted(PROBLEMS.glob("*.toml")) if is_static(file)]

@@ -179,14 +179,17 @@ def robot(force=(0.0, 0.0, 0.0), analysis=None, b2=None):
     )
 
 
-def shot(force):
-    """Tip and front angles of :func:`robot` by the equations of Rucker, Jones and Webster, and shooting."""
-    force = np.asarray(force, dtype=float)
-    tubes = [("one", 0.0, STRAIGHT + CURVED, STRAIGHT, OWN, 0.0)]
-    tubes += [
-        (t["section"], -t["start"], t["start"] + t["length"], t["start"] + t["curved_from"], t["curvature"], t["angle"])
-        for t in TUBES.values()
-    ]
+def shot(force, slid=(0.0, 0.0), grown=0.0, at=None):
+    """Tip, front angles and unknowns of :func:`robot` by the equations of Rucker, Jones and Webster, and shooting.
+
+    The two outer tubes are pushed out by lengths ``slid``, the innermost by ``grown``; also angles and rates at ``at``.
+    """
+    force, straight = np.asarray(force, dtype=float), STRAIGHT + grown
+    tubes = [("one", 0.0, straight + CURVED, straight, OWN, 0.0)]
+    for t, more in zip(TUBES.values(), slid, strict=True):
+        begin = t["start"] + more
+        curved = begin + t["curved_from"]
+        tubes.append((t["section"], -begin, begin + t["length"], curved, t["curvature"], t["angle"]))
     ends = sorted({0.0, *(t[2] for t in tubes), *(t[3] for t in tubes)})
     pieces = list(zip(ends, ends[1:], strict=False))
 
@@ -222,6 +225,8 @@ def shot(force):
         y = np.concatenate([np.zeros(3), np.eye(3).ravel(), moment, angles, twists])
         fronts = {}
         for a, b in pieces:
+            if at is not None and a <= at <= b:
+                fronts["at"] = solve_ivp(rate, (a, at), y, args=(0.5 * (a + b),), rtol=1e-10, atol=1e-12).y[15:21, -1]
             y = solve_ivp(rate, (a, b), y, args=(0.5 * (a + b),), rtol=1e-10, atol=1e-12).y[:, -1]
             fronts |= {i: (y[15 + i], y[18 + i]) for i in (1, 2) if tubes[i][2] == b}
         return y, fronts
@@ -234,7 +239,7 @@ def shot(force):
     found = root(missed, guess, tol=1e-11)
     assert np.abs(missed(found.x)).max() < 1e-8
     y, fronts = march(found.x)
-    return y[:3], [fronts[1][0], fronts[2][0]], found.x
+    return y[:3], [fronts[1][0], fronts[2][0]], found.x if at is None else fronts["at"]
 
 
 SCALE = 0.01
@@ -490,7 +495,7 @@ def test_refused_parameters():
     with pytest.raises(SceneError, match="found the curvature along a member with tubes, accepted: its position"):
         sfetcas.parametric(pair(GJ=1.0), ["tubes.t.angle"], ["members.m.curvature at 0.5"])
     with pytest.raises(SceneError, match="found a number that changes the elements"):
-        sfetcas.parametric(pair(GJ=1.0), ["tubes.t.start"], ["nodes.B.position"])
+        sfetcas.parametric(pair(GJ=1.0), ["tubes.t.length"], ["nodes.B.position"])
 
 
 # -- beside obstacles --------------------------------------------------------------------------------

@@ -163,6 +163,9 @@ tendons.NAME.released | | | statics, motion | of one with friction: whether it i
 tubes.NAME.torque | N m | | statics, motion, parameters | about the tangent, of what turns its base on the tube
 tubes.NAME.angle | rad | | all | of its front end against the section there, counting turns
 tubes.NAME.energy | J | | statics, motion, parameters | strain energy of the tube along its members and behind them
+tubes.NAME.turn at | rad | | statics, motion | against the section there, counting turns
+tubes.NAME.curvature at | 1/m | b1 b2 b3 | statics, motion | its own twist (b1) and curvatures about its own axes
+tubes.NAME.moment at | N m | b1 b2 b3 | statics, motion | its own torque (b1) and bending moments about its own axes
 motions.NAME.moment | N m | x y z | statics, motion, parameters | what makes a rotation; a number where that is one
 motions.NAME.force | N | x y z | statics, motion, parameters | what makes a displacement; a number at a driven joint
 magnets.NAME.energy | J | | statics, motion, parameters | minus the moment times the field, summed along members

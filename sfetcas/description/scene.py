@@ -23,6 +23,7 @@ from .changes import FACTOR, Branch, branch_of, carry_ends, with_entries
 from .contacts import Contact
 from .dimension import out_of_plane
 from .formulas import Formula
+from .inserting import check_insertion, pushed, refuse_insertion
 from .loads import History, Load, Motion
 from .matrices import check_inertia, check_rigid_motion
 from .moving import check_beginning, check_driving, check_masses, check_no_contact, check_velocities
@@ -38,7 +39,7 @@ from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
 from .task import Analysis, Expect, Until
 from .tendons import Piece, Stretch, Tendon, Way, check_pieces, check_way, pieces_of
-from .tubes import Run, Tube, check_tube, runs_of
+from .tubes import Run, Tube, check_tube, check_turns, runs_of
 
 __all__ = [
     "Actuation",
@@ -333,6 +334,11 @@ class Scene(Record):
         """Whether the law of any member's section has memory, so that each step has to come after another."""
         return bool(remembering_section(self))
 
+    @cached_property
+    def inserts(self) -> bool:
+        """Whether tubes or members are pushed out as the load factor grows, so that each step comes after another."""
+        return any(pushed(self))
+
     @property
     def resolved_dimension(self) -> Literal["plane", "space"]:
         """How the scene is modelled: plane or space."""
@@ -378,7 +384,8 @@ class Scene(Record):
     @property
     def histories_used(self) -> set[str]:
         """Names of the histories that something has."""
-        return {record.history for _, _, record in self.driven if record.history is not None}
+        pushing = {record.insertion_history for _, _, record in pushed(self)}
+        return {name for name in (*pushing, *(one.history for _, _, one in self.driven)) if name is not None}
 
 
 DRIVEN = ("loads", "tendons", "tubes", "motions", "actuations", "fields")
@@ -518,6 +525,8 @@ def _check_tubes(scene: Scene) -> None:
         _known(tube.history, scene.histories, "histories", "tubes", name, "history")
         try:
             check_tube(tube, scene.nodes, scene.members, scene.sections, scene.center_lines)
+            history = None if tube.history is None else scene.histories[tube.history]
+            check_turns(tube, scene.analysis.steps if history is None else history.factor(np.array(history.t)))
         except SceneError as error:
             raise error.within("tubes", name) from None
         if scene.rotating is not None:
@@ -979,7 +988,7 @@ def check_scene(value: object, call: str, *, steps: bool = True) -> None:
     ----------
     value : the argument
     call : the call for the message, with braces for the argument: ``check({}, ...)``
-    steps : whether its steps come one after the other, else laws with memory are refused
+    steps : whether its steps come one after the other, else laws with memory and insertions are refused
 
     Raises
     ------
@@ -988,7 +997,9 @@ def check_scene(value: object, call: str, *, steps: bool = True) -> None:
     """
     if isinstance(value, Scene):
         if not steps:
-            refuse_memory(value, f"{call.partition('(')[0]} knows no steps, accepted: solve(scene)")
+            message = f"{call.partition('(')[0]} knows no steps, accepted: solve(scene)"
+            refuse_memory(value, message)
+            refuse_insertion(value, message)
         return
     found, made = say(value), "load('FILE.toml')"
     if isinstance(value, (str, os.PathLike)):
@@ -1020,5 +1031,6 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_moving,
     _check_contacts,
     check_memory,
+    check_insertion,
     _check_expect,
 )

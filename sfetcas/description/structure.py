@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, model_validator
 from ..errors import SceneError
 from .formulas import Formula
 from .matrices import Mass, Stiffness, check_mass, check_stiffness
-from .records import Direction, NotNegative, Record, Vector, counted, listed, number, say, turn, whole
+from .records import Direction, NotNegative, Number, Record, Vector, counted, listed, number, say, turn, whole
 from .relaxation import Relaxation
 from .sections import OFF_LINE, CrossSection, Polynomial, Quantity, Table, quantity
 from .shapes import Shape, Straight
@@ -231,6 +231,11 @@ class Member(Record):
         Dynamic: rotation of the sections along the member at t = 0 since the undeformed scene.  In a plane scene a
         number or varying along the member, in space a rotation vector (3,) in the fixed axes, each number of which may
         vary.  Default: zero, of a rigid member that of its nodes.
+    insertion : m
+        Statics: length by which a straight member is pushed out of its clamped first node at factor 1; below zero it
+        is drawn in.  It grows there, and what lies beyond it goes with its end.
+    insertion_history : name
+        Name of a history that replaces the load factor of the step.  It multiplies the ``insertion``.
     """
 
     nodes: Annotated[tuple[str, ...], BeforeValidator(_ends)]
@@ -245,6 +250,8 @@ class Member(Record):
     mass: Mass | None = None
     spin: Spin | None = None
     turned: Turned | None = None
+    insertion: Number = 0.0
+    insertion_history: str | None = None
 
     @property
     def turned_about(self) -> tuple[Quantity, Quantity, Quantity]:

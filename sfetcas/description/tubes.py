@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any, final
 
 import numpy as np
-from pydantic import BeforeValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
@@ -20,7 +20,7 @@ from .sections import CrossSection
 from .shapes import CenterLine
 from .structure import Member, Node
 
-__all__ = ["Run", "Tube", "check_tube", "mass_of_tubes", "runs_of", "tube_breaks"]
+__all__ = ["Run", "Tube", "check_reach", "check_tube", "check_turns", "mass_of_tubes", "runs_of", "tube_breaks"]
 
 
 def _names(value: Any) -> tuple[Any, ...]:
@@ -28,6 +28,18 @@ def _names(value: Any) -> tuple[Any, ...]:
     if not names:
         raise ValueError("found an empty list, accepted: at least one member")
     return names
+
+
+def _angle(value: float) -> float:
+    if abs(value) > LARGEST:
+        raise ValueError(f"found {value:g}, accepted: an angle from {-LARGEST:g} to {LARGEST:g} rad")
+    return value
+
+
+LARGEST = 1e6
+"""Largest angle of a base, rad: rounding leaves 1e-10 of it, and no drive makes so many turns."""
+
+Angle = Annotated[Number, AfterValidator(_angle)]
 
 
 @final
@@ -59,6 +71,11 @@ class Tube(Record):
         Further angle at factor 1.
     history : name
         Name of a history that replaces the load factor of the step.  It multiplies the ``rotation``.
+    insertion : m
+        Length by which it is pushed forward from ``start`` at factor 1; below zero it is drawn back.  Load steps come
+        one after the other then.
+    insertion_history : name
+        Name of a history that replaces the load factor of the step.  It multiplies the ``insertion``.
 
     Examples
     --------
@@ -72,9 +89,11 @@ class Tube(Record):
     start: Number = 0.0
     curvature: Turn = 0.0
     curved_from: NotNegative = 0.0
-    angle: Number = 0.0
-    rotation: Number = 0.0
+    angle: Angle = 0.0
+    rotation: Angle = 0.0
     history: str | None = None
+    insertion: Number = 0.0
+    insertion_history: str | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Tube:
@@ -177,7 +196,32 @@ def check_tube(
         raise SceneError(f"the section {tube.section!r} lacks the key {missing[0]!r}: a tube needs it", ("section",))
     for one, other in pairwise(tube.members):
         _check_joined(one, other, nodes, members, lines)
-    total = sum(lines[name].length for name in tube.members)
+    check_reach(tube, sum(lines[name].length for name in tube.members))
+
+
+def check_turns(tube: Tube, factors: Iterable[float]) -> None:
+    """Refuse a base that ``factors`` turn beyond the largest angle.
+
+    Raises
+    ------
+    SceneError
+        Its place begins with a key of the tube.
+    """
+    for factor in factors:
+        angle = tube.angle + factor * tube.rotation
+        if abs(angle) > LARGEST:
+            accepted = f"an angle of the base from {-LARGEST:g} to {LARGEST:g} rad"
+            raise SceneError(f"found {angle:g} rad for the factor {factor:g}, accepted: {accepted}", ("rotation",))
+
+
+def check_reach(tube: Tube, total: float) -> None:
+    """Refuse a tube that reaches beyond its members, which have a length of ``total``, m, together.
+
+    Raises
+    ------
+    SceneError
+        Its place begins with a key of the tube.
+    """
     if tube.start + tube.length > total * (1.0 + tolerances.WRITTEN):
         found = f"found an end at {tube.start + tube.length:.9g} m along the members"
         accepted = f"up to their end at {total:.9g} m: the tube that reaches furthest is the member"

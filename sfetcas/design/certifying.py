@@ -51,7 +51,7 @@ def certified(scene: Scene, equations: CaseEquations, state: State, case: str) -
     SolveError
         The case is no equilibrium of its scene.
     """
-    prepared = prepared_case(scene, equations, equations.mesh)
+    prepared = prepared_case(scene, equations, equations.arguments.mesh_at(scene, equations.mesh))
     found = prepared.correct(state, prepared.model.loading(float(scene.analysis.steps[-1])))
     if not found.residual <= tolerances.BALANCED or prepared.distance(found.state, state) > tolerances.SAME_STATE:
         raise SolveError(Status.FAILED, labelled(case, "what was found is no equilibrium of the scene"), state)

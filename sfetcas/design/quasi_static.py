@@ -329,7 +329,8 @@ class QuasiStatic(Cases):
         for share in SHARES:
             numbers = (1.0 - share) * optimum.numbers[i - 1] + share * optimum.numbers[i]
             scene = self.statement.scene_with(dict(zip(names, numbers.tolist(), strict=True)))
-            prepared = prepared_case(scene, optimum.equations, optimum.mesh)
+            mesh = optimum.equations.arguments.mesh_at(scene, optimum.mesh)
+            prepared = prepared_case(scene, optimum.equations, mesh)
             found = prepared.correct(state, prepared.model.loading(here.factor), most=1.0)
             if not found.converged:
                 return False

@@ -45,7 +45,7 @@ def value_of(step: Configuration, name: str | AnswerName, at: float | None = Non
     kind, at = name.kind, name.at if name.at is not None else at
     if kind.along and at is None:
         raise SceneError(f"found {name.quantity!r}, accepted: {kind.name} with the key 'at'")
-    found = step.along(name.record, [at]) if kind.along else step.table(kind.table, name.record)
+    found = step.told_along(kind.table, name.record, [at]) if kind.along else step.table(kind.table, name.record)
     if kind.key not in found and step.where not in kind.where:
         raise SceneError(f"found {name.quantity!r}, told of {', '.join(kind.where)} only")
     value = entry_of(found, kind.key)
@@ -164,7 +164,7 @@ class Quantity:
         loads = max(1.0, float(np.abs(loading.force).max(initial=0.0)), float(np.abs(loading.pull).max(initial=0.0)))
         largest = [tolerances.UNIT * own * loads, *(float(np.linalg.norm(value)) for value in values)]
         if kind.along:
-            along = step.along(self.name.record, step.places(self.name.record))[kind.key]
+            along = step.told_along(kind.table, self.name.record)[kind.key]
             largest.append(float(np.linalg.norm(along.reshape(len(along), -1), axis=1).max()))
         return max(largest)
 

@@ -206,6 +206,47 @@ class Configuration:
         """
         return dict(self.fields.tube(self._known(name, tuple(self.model.scene.tubes), "tube")))
 
+    def along_tube(self, name: str, at: Any) -> dict[str, Array]:
+        """Fields of a tube at fractions of its own length, from 0 at its base to 1 at its front end.
+
+        Parameters
+        ----------
+        name : str
+        at : float or (n,)
+
+        Returns
+        -------
+        dict of ndarray
+            ``turn`` (n,) rad, by which it is turned about the tangent against the section there, counting turns;
+            ``curvature`` (n, 3) 1/m, its twist and curvatures about its own axes b1, b2, b3, and ``moment`` (n, 3) N m,
+            its torque and bending moments about these.  Behind its members the section is their first one.
+
+        Raises
+        ------
+        SceneError
+            There is no such tube, or a fraction is not between 0 and 1.
+        """
+        known, places = self._known(name, tuple(self.model.scene.tubes), "tube"), np.atleast_1d(at)
+        return self.fields.along_tube(known, self._fractions(name, places))
+
+    def told_along(self, kind: str, name: str, at: Any = None) -> dict[str, Array]:
+        """:meth:`along` of a member or :meth:`along_tube` of a tube, by the table of the scene.
+
+        At the places that the answer lists where ``at`` is None.
+        """
+        if kind == "tubes":
+            return self.along_tube(name, self.fields.places_of_tube(name) if at is None else at)
+        return self.along(name, self.places(name) if at is None else at)
+
+    @staticmethod
+    def _fractions(name: str, places: Array) -> Array:
+        """Places along a member or a tube, refused where they are none."""
+        outside = [place for place in places if not 0.0 <= place <= 1.0]
+        if outside or not len(places):
+            what = f"{outside[0]:g}" if outside else "none"
+            raise SceneError(f"along {name!r}: found {what}, accepted: fractions of the length, from 0 to 1")
+        return places
+
     def motion(self, name: str) -> dict[str, Any]:
         """What enforces a prescribed motion: ``moment`` (N m) or ``force`` (N), see :meth:`.Fields.drive`."""
         return self.fields.drive(self._known(name, tuple(self.model.scene.motions), "motion"))
@@ -237,11 +278,7 @@ class Configuration:
             There is no such member, or a fraction is not between 0 and 1.
         """
         name, places = self._known(member, tuple(self.model.scene.members), "member"), np.atleast_1d(at)
-        outside = [place for place in places if not 0.0 <= place <= 1.0]
-        if outside or not len(places):
-            what = f"{outside[0]:g}" if outside else "none"
-            raise SceneError(f"along {name!r}: found {what}, accepted: fractions of the length, from 0 to 1")
-        found = self.fields.along(name, places)
+        found = self.fields.along(name, self._fractions(name, places))
         rotation = found.pop("rotation")
         found["quaternion"] = self._as_quaternions(rotation)
         if not self.model.space:
@@ -358,6 +395,9 @@ class Equilibrium(Configuration):
         Elastic energy, and its sum with the potential of the loads, dimensionless; :attr:`energy` has them in N m.
     way : tuple of str
         The solution strategies that led to it, in their order, see :data:`~sfetcas.equilibria.ways.WAYS`.
+    snaps : tuple of float
+        Of a scene with insertions: load factors since the step before at which a state that ceased to be stable was
+        left, see :mod:`~sfetcas.equilibria.insertion_steps`.
     """
 
     certificate: Certificate
@@ -366,6 +406,7 @@ class Equilibrium(Configuration):
     strain: float
     potential: float
     way: tuple[str, ...] = ()
+    snaps: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         head = [f"factor={self.factor:g}", self.certificate.in_words]
@@ -406,8 +447,12 @@ class Equilibrium(Configuration):
         for name, found in tables["members"].items():
             places = self.places(name)
             tables["members"][name] = {"s": places, **self.along(name, places), **found}
+        for name, found in tables.get("tubes", {}).items():
+            places = self.fields.places_of_tube(name)
+            tables["tubes"][name] = {"s": places, **self.along_tube(name, places), **found}
         proof = {"energy": self.energy, "certificate": self.certificate.to_dict()}
-        return {"factor": self.factor, **plain(tables), **proof, "notes": list(self.notes)}
+        told = {"snaps": list(self.snaps)} if self.snaps else {}
+        return {"factor": self.factor, **plain(tables), **proof, **told, "notes": list(self.notes)}
 
 
 @dataclass(frozen=True, eq=False)

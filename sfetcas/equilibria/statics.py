@@ -60,6 +60,10 @@ def solve(
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
     settings = settings_with(settings, changes)
+    if scene.inserts:
+        from .insertion_steps import InsertionSteps
+
+        return InsertionSteps(scene, settings).solution()
     return LoadSteps(scene, settings, stops).solution()
 
 

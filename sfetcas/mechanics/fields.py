@@ -36,6 +36,7 @@ from .stretch_laws import least_tangent, strain_by_force, stretch_law_of
 from .tendon_friction import settle, turned_since
 from .tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
 from .terms import answers_of, energies_of
+from .tube_fields import fields_of_tube, places_along
 from .tubes import angles_like, moments_of
 
 __all__ = ["Fields", "rotations_along", "strained_like", "transferred"]
@@ -234,15 +235,15 @@ class Fields:
     def _shared_with_tubes(self, member: str, x: Array, moment: Array) -> Array:
         """Strains (n, 3), 1/m, about the section axes of a member that carries moments (n, 3), N m, with its tubes."""
         scene = self.model.scene
-        more, offset = moments_of(self.model, member, x, self.twisted, self._bases)
+        more, offset = moments_of(self.model, member, x, self.twisted, self.bases)
         natural = scene.center_lines[member].curvatures(x) + self.natural(member, x)
         own = scene.sections[str(scene.members[member].section)].stiffness_matrix(x)
         missing = moment - offset - np.einsum("nij,nj->ni", more, natural)
         return np.asarray(np.linalg.solve(own + more, missing[..., None])[..., 0])
 
     @functools.cached_property
-    def _bases(self) -> dict[str, float]:
-        """Angles of the bases of tubes, rad."""
+    def bases(self) -> dict[str, float]:
+        """Angles of the bases of tubes, rad, by their names."""
         found = dict[str, float]()
         for group, load in zip(self.model.connections, self._loading.loads, strict=True):
             if group.kind.table == "tubes" and group.kind.along_element:
@@ -254,6 +255,14 @@ class Fields:
         strain ``energy`` (J).
         """
         return self.balance.tube(name)
+
+    def along_tube(self, name: str, at: Array) -> dict[str, Array]:
+        """Turn, curvature and moment of a tube at fractions of its length, as of :meth:`.Configuration.along_tube`."""
+        return fields_of_tube(self, name, at)
+
+    def places_of_tube(self, name: str) -> Array:
+        """Fractions (n,) of the length of a tube, rising from 0 to 1, at the nodes of elements."""
+        return places_along(self.model, name)
 
     def section_forces(self, member: str, x: Array) -> Array:
         """Section forces (n, 3), N, along b1, b2, b3 at fractions x (n,) of a flexible or rigid member's length."""

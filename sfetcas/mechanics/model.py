@@ -14,6 +14,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..description.inserting import refuse_insertion
 from ..description.records import brief, counted, enumerated
 from ..description.remembering import refuse_memory
 from ..description.scene import Scene, check_scene
@@ -63,6 +64,9 @@ SOURCES: list[Callable[[Parts], Iterable[One]]] = [
     tubes_in,
 ]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
+
+KNOWS_NO_STEPS = "a model by itself knows no steps, accepted: solve(scene)"
+"""What is said of scenes whose load steps come one after the other."""
 
 
 @dataclass(frozen=True)
@@ -225,7 +229,7 @@ class Model:
             :func:`sfetcas.solve` finds.
         """
         scene = self.scene
-        refuse_memory(scene, "a model by itself knows no steps, accepted: solve(scene)")
+        refuse_memory(scene, KNOWS_NO_STEPS)
         if scene.contacts and not self.mesh.touches:
             message = "a model by itself knows no contact, accepted: the scene without contacts, or solve(scene)"
             raise SceneError(message, ("contacts",))
@@ -324,7 +328,8 @@ def assemble(
     """
     check_scene(scene, "assemble({}, ...)")
     if mesh.memory is None:
-        refuse_memory(scene, "a model by itself knows no steps, accepted: solve(scene)")
+        refuse_memory(scene, KNOWS_NO_STEPS)
+    refuse_insertion(scene, KNOWS_NO_STEPS)
     if scene.rotating is not None:
         mesh, assembly = replace(mesh, places=True), "nodal"
     space = scene.resolved_dimension == "space"

@@ -46,7 +46,9 @@ __all__ = [
     "elements_in",
     "moments_of",
     "roughness",
+    "sections_of",
     "tubes_in",
+    "twist_behind",
 ]
 
 POINT = 21
@@ -296,12 +298,27 @@ def axes_along(line: Any, run: Run, x: Array) -> tuple[Array, Array]:
 
 def _behind(scene: Any, tube: Tube) -> Any:
     """Torsional stiffness, N m, of the part of a tube behind its members."""
-    section, share = scene.sections[tube.section], -tube.start / tube.length
+    return 1.0 / _compliance(scene, tube, -tube.start)
+
+
+def _compliance(scene: Any, tube: Tube, end: Any) -> Any:
+    """Torsional compliance, 1/(N m), of a tube from its base to an arc length, m."""
+    section, share = scene.sections[tube.section], end / tube.length
     breaks = np.unique([0.0, *(x for x in section.breaks if x < share), share])
     nodes, weights = np.polynomial.legendre.leggauss(8)
     spans = np.diff(breaks)
     x = (breaks[:-1, None] + 0.5 * spans[:, None] * (1.0 + nodes)).ravel()
-    return 1.0 / (tube.length * ((0.5 * spans[:, None] * weights).ravel() / section.stiffness(x)[:, 0]).sum())
+    return tube.length * ((0.5 * spans[:, None] * weights).ravel() / section.stiffness(x)[:, 0]).sum()
+
+
+def twist_behind(scene: Any, tube: Tube, own: Array, angle: float) -> tuple[Array, Array, float]:
+    """Angle (n,), rad, and twist (n,), 1/m, behind the members of a tube, and its torque, N m.
+
+    At arc lengths (n,), m, from its base, where it is twisted by an angle, rad, up to its members.
+    """
+    torque = float(_behind(scene, tube)) * angle
+    twist = torque / scene.sections[tube.section].stiffness(own / tube.length)[:, 0]
+    return np.array([torque * float(_compliance(scene, tube, end)) if end else 0.0 for end in own]), twist, torque
 
 
 # -- of a state -------------------------------------------------------------------------------------
@@ -334,18 +351,25 @@ def angles_along(model: Any, tube: str, member: str, x: Array, values: Array) ->
 def angles_like(target: Any, y: Array, source: Any, values: Array) -> None:
     """Set the angles of tubes among the displacement unknowns ``y`` of one model to those of another, in place.
 
-    ``values`` are the displacement unknowns of the other model, of the same scene on another mesh.
+    ``values`` are the displacement unknowns of the other model, of the same tubes on another mesh, or elsewhere along
+    their members: beyond the ends of a tube its angles there go on.
     """
     if not target.scene.tubes:
         return
     known = source.positions.retained[:, 0]
     there = np.where(known < 0, 0.0, np.append(values, 0.0)[known])
-    for tube in target.scene.tubes:
-        for run, part, places in _runs(target, tube):
-            cuts, first = target.mesh.cuts[run.member], target.beams.first[run.member]
-            cuts = cuts[part.start - first : part.stop - first + 1]
-            x = (cuts[:-1, None] + np.diff(cuts)[:, None] * target.element.nodes).ravel()
-            found = angles_along(source, tube, run.member, x, there)[0].reshape(places.shape)
+    for name in target.scene.tubes:
+        nodal = {run.member: _nodal(places, there) for run, _, places in _runs(source, name)}
+        last = float(next(iter(nodal.values()))[0, 0])
+        for run, part, places in _runs(target, name):
+            if run.member in nodal:
+                cuts, first = target.mesh.cuts[run.member], target.beams.first[run.member]
+                cuts = cuts[part.start - first : part.stop - first + 1]
+                x = (cuts[:-1, None] + np.diff(cuts)[:, None] * target.element.nodes).ravel()
+                found = angles_along(source, name, run.member, x, there)[0].reshape(places.shape)
+                last = float(nodal[run.member][-1, -1])
+            else:
+                found = np.full(places.shape, last)
             unknown = np.where(places < 0, -1, target.positions.retained[np.maximum(places, 0), 0])
             y[unknown[unknown >= 0]] = found[unknown >= 0]
 
@@ -372,21 +396,26 @@ def moments_of(model: Any, member: str, x: Array, values: Array, bases: Mapping[
     bases : angles of the bases, rad, by the names of the tubes
     """
     stiffness, moment = np.zeros((len(x), 3, 3)), np.zeros((len(x), 3))
-    scene = model.scene
-    for name, tube in scene.tubes.items():
-        for run in scene.tube_runs[name]:
+    for name, runs in model.scene.tube_runs.items():
+        for run in runs:
             if run.member != member:
                 continue
             angle, twist, there = angles_along(model, name, member, x, values)
-            angle = angle + bases[name] - run.turned
-            own = run.begin + x * scene.center_lines[member].length
-            section = scene.sections[tube.section].stiffness_matrix(np.clip(own / tube.length, 0.0, 1.0))
-            c, s, nothing = np.cos(angle), np.sin(angle), np.zeros(len(x))
-            # Axes of the tube as columns.
-            rows = [[nothing + 1.0, nothing, nothing], [nothing, c, -s], [nothing, s, c]]
-            axes = np.moveaxis(np.array(rows), 2, 0)
-            natural = np.where((own >= tube.curved_from)[:, None], tube.vector, 0.0)
+            axes, section, natural = sections_of(model, name, run, x, angle + bases[name] - run.turned)
             natural[:, 0] -= twist
             stiffness += np.einsum("nij,njk,nlk->nil", axes, section, axes) * there[:, None, None]
             moment -= np.einsum("nij,njk,nk->ni", axes, section, natural) * there[:, None]
     return stiffness, moment
+
+
+def sections_of(model: Any, name: str, run: Run, x: Array, angle: Array) -> tuple[Array, Array, Array]:
+    """Axes of a tube as columns (n, 3, 3), about those of the member, stiffness (n, 3, 3), N m2, and natural curvature
+    (n, 3), 1/m, at fractions x (n,) of the length of a member against which it is turned by angles (n,), rad.
+    """
+    tube, scene = model.scene.tubes[name], model.scene
+    own = run.begin + x * scene.center_lines[run.member].length
+    section = scene.sections[tube.section].stiffness_matrix(np.clip(own / tube.length, 0.0, 1.0))
+    c, s, nothing = np.cos(angle), np.sin(angle), np.zeros(len(x))
+    rows = [[nothing + 1.0, nothing, nothing], [nothing, c, -s], [nothing, s, c]]
+    natural = np.where((own >= tube.curved_from)[:, None], tube.vector, 0.0)
+    return np.moveaxis(np.array(rows), 2, 0), section, natural

@@ -32,6 +32,7 @@ from ..mechanics.model import Model, assemble
 from ..mechanics.terms import ALWAYS
 from ..solvers.program import Program, data_of, is_data
 from .results import Results
+from .sliding_tubes import SLIDING, carried_along, reach_of, slid_through
 
 __all__ = [
     "FACTOR",
@@ -174,7 +175,7 @@ BESIDE_DIAGONAL = r"(sections\.[^.]+\.stiffness)\.(\d)\.(?!\2)(\d)"
 
 MESHED = (
     r"members\.[^.]+\.elements|(actuations|magnets)\.[^.]+\.(from|to)|tendons\.[^.]+\.way\.\d+\.(from|to|discs(\.\d+)?)"
-    r"|tubes\.[^.]+\.(start|length|curved_from)"
+    r"|tubes\.[^.]+\.(length|curved_from|insertion)|members\.[^.]+\.insertion"
 )
 """Names of numbers at which elements end."""
 
@@ -267,7 +268,7 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
         message = "found a time or factor at which a history has a knot, accepted: its values or coefficients"
         raise SceneError(message, ("arguments", name))
     found = _argument(scene, name, low, high)
-    if MOVING.fullmatch(name):
+    if MOVING.fullmatch(name) or SLIDING.fullmatch(name):
         found = _within(scene, found)
     outside = [x for x in found.default if not found.limits[0] <= x <= found.limits[1]]
     if outside:
@@ -315,18 +316,20 @@ MOVING = re.compile(r"loads\.([^.]+)\.(at|from|to)")
 
 
 def _within(scene: Scene, place: Argument) -> Argument:
-    """The place of a load along its member, which stays between the kinks, loads and ends beside it.
+    """The place of a load or a tube along its member, which stays between the kinks, loads and ends beside it.
 
     Raises
     ------
     SceneError
         Something else is there too, or a range goes further.
     """
-    (at,), (low, here, high) = place.default, _beside(scene, place.name)
+    beside = reach_of if SLIDING.fullmatch(place.name) else _beside
+    (at,), (low, here, high) = place.default, beside(scene, place.name)
     if not low + APART < here < high - APART:
         message = f"found {at:g}, where a kink, another load or an end is, accepted: a place by itself"
         raise SceneError(message, ("arguments", place.name))
-    least, most = low + APART * (high - low), high - APART * (high - low)
+    share = APART * (high - low if np.isfinite(low) else scene.size)
+    least, most = low + share, high - share
     wanted = (least if place.low is None else place.low), (most if place.high is None else place.high)
     if wanted[0] < least or wanted[1] > most:
         message = f"found {wanted[0]:g} to {wanted[1]:g}, accepted: a range between {low:g} and {high:g}"
@@ -416,6 +419,7 @@ UNITS = {
     "length": "m",
     "offset": "m",
     "ground": "m",
+    "start": "m",
     "pressure": "Pa",
     "area": "m2",
     "factor": "1",
@@ -595,6 +599,12 @@ class Arguments:
         analysis = scene.analysis.model_copy(update={"steps": steps})
         return scene.model_copy(update={"analysis": analysis, "histories": histories})
 
+    def mesh_at(self, scene: Scene, mesh: Mesh) -> Mesh:
+        """A mesh of the scene as given, with ends of elements where they are with other values of its numbers."""
+        moving = [one.name for one in self.arguments if MOVING.fullmatch(one.name) or SLIDING.fullmatch(one.name)]
+        there = {name: float(_value(scene, name.split("."), name)) for name in moving}
+        return with_cuts(self._scene, mesh, there) if there else mesh
+
     # -- what is given --------------------------------------------------------------------------------
 
     def _every(self) -> dict[str, bool]:
@@ -693,32 +703,37 @@ def in_words(arguments: Arguments, results: Results) -> list[str]:
 
 
 def with_cuts(scene: Scene, mesh: Mesh, symbolic: Mapping[str, Any]) -> Mesh:
-    """The mesh with symbolic ends of elements that move with the places of loads along their members."""
-    moving: dict[str, dict[str, Any]] = {}
+    """The mesh with symbolic ends of elements that move with the places of loads and tubes along their members."""
+    moving: dict[str, dict[float, Any]] = {}
     for name, place in symbolic.items():
         found = MOVING.fullmatch(name)
         member = str(scene.loads[found[1]].member) if found else ""
         if member in mesh.cuts:
-            moving.setdefault(member, {})[name] = place
+            moving.setdefault(member, {})[_beside(scene, name)[1]] = place
+        for member, at, there in carried_along(scene, name, place) if SLIDING.fullmatch(name) else ():
+            moving.setdefault(member, {})[at] = there
     cuts = dict(mesh.cuts)
     for member, places in moving.items():
         breaks = breaks_of(scene, member)
         there, moved = list(breaks), np.zeros(len(cuts[member]), bool)
-        for name, place in places.items():
-            low, at, high = _beside(scene, name)
-            there[int(np.argmin(np.abs(breaks - at)))] = place
-            moved |= (cuts[member] > low) & (cuts[member] < high)
+        for at, place in places.items():
+            number = int(np.argmin(np.abs(breaks - at)))
+            there[number] = place
+            moved |= (cuts[member] > breaks[number - 1]) & (cuts[member] < breaks[number + 1])
         cuts[member] = np.where(moved, np.interp(cuts[member], breaks, numbers(there)), cuts[member])
     return replace(mesh, cuts=cuts)
 
 
 def _check_apart(scene: Scene, arguments: Sequence[Argument]) -> None:
-    """Refuse places of loads on one member that might meet."""
-    places = [(one, MOVING.fullmatch(one.name)) for one in arguments]
-    known = [(str(scene.loads[found[1]].member), one.default[0], one) for one, found in places if found]
+    """Refuse places of loads and tubes on one member that might meet."""
+    places = [(one, MOVING.fullmatch(one.name), one.low or 0.0, one.high or 0.0) for one in arguments]
+    known = [(str(scene.loads[found[1]].member), low, high, one) for one, found, low, high in places if found]
+    for one, _, low, high in places:
+        if SLIDING.fullmatch(one.name):
+            known += [(*each, one) for each in slid_through(scene, one.name, low, high)]
     known.sort(key=lambda each: each[:2])
-    for (member, _, one), (other, _, after) in pairwise(known):
-        if member == other and (one.high or 0.0) >= (after.low or 0.0):
+    for (member, _, high, one), (other, low, _, after) in pairwise(known):
+        if member == other and high >= low and one is not after:
             message = f"found {one.name} and {after.name}, which may meet, accepted: ranges apart from each other"
             raise SceneError(message, ("arguments",))
 

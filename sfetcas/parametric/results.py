@@ -254,7 +254,9 @@ class Results:
         moving = set(members)
         for result in self.results:
             if result.asked.kind.along and result.asked.record in moving:
-                message = f"found {result.name}, along a member on which a load moves, accepted: answers of nodes"
+                message = (
+                    f"found {result.name}, along a member on which a load or a tube moves, accepted: answers of nodes"
+                )
                 raise SceneError(message, ("results",))
 
     def rest(self, model: Model) -> Array:

@@ -314,8 +314,11 @@ def _sketch_tendon(sketch: Sketch, name: str, tendon: Tendon) -> None:
 
 def _sketch_tube(sketch: Sketch, name: str, tube: Tube) -> None:
     """A wide band below its members, the wider the shorter it is, so that each is seen."""
-    longer = sum(other.start + other.length > tube.start + tube.length for other in sketch.scene.tubes.values())
-    for run in sketch.scene.tube_runs[name]:
+    # Where tubes are pushed out each step has its own scene.
+    scene = sketch.step.model.scene
+    reach = scene.tubes[name].start + tube.length
+    longer = sum(other.start + other.length > reach for other in scene.tubes.values())
+    for run in scene.tube_runs[name]:
         line = sketch.along(run.member, np.linspace(run.start, run.end, 97))
         sketch.line(line, f"tube-{name}", colour=TUBE, width=9.0 + 3.0 * longer, level=1.5 - 0.1 * longer)
 

@@ -20,7 +20,17 @@ from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from .prepared import Prepared, Solved
 
-__all__ = ["CONTRACTION", "JUMPED", "NARROW", "Followed", "advanced", "between", "follow", "near_factor"]
+__all__ = [
+    "CONTRACTION",
+    "JUMPED",
+    "NARROW",
+    "STEP_ROTATION",
+    "Followed",
+    "advanced",
+    "between",
+    "follow",
+    "near_factor",
+]
 
 STEP_ROTATION = 0.4
 """A step is too long when its corrections turn a node by more than this, rad."""
