@@ -23,7 +23,7 @@ from ..mechanics.balance import three
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
 from ..mechanics.memory import Remembering
-from ..mechanics.model import Model
+from ..mechanics.model import Model, assemble
 from .projecting import factor_closings
 
 if TYPE_CHECKING:
@@ -45,20 +45,24 @@ class Mover:
     def __init__(self, equations: Equations, inertia: Inertia, time: float, factors: Callable[[float], Array]) -> None:
         self.equations, self.inertia, self.time, self.factors = equations, inertia, time, factors
         self.model: Model = equations.model
-        self.memory = Remembering(self.model)
+        self.memory, self.one_sided = Remembering(self.model), inertia.system.one_sided
+        self._models: dict[bytes, Equations] = {}
 
     def instant(self, sample: Sample) -> MotionState:
         """The state by name of a dimensionless sample; multipliers balance all forces in least squares."""
-        model, equations = self.model, self.equations
+        model, equations, system = self.model, self.equations, self.inertia.system
         if self.memory.size:
             model = self.memory.model_with(sample.remembered)
             equations = equations.remembering(model)
-        loading = self.inertia.system.loading(self.factors(sample.t))
-        free = State(sample.q, sample.y, np.zeros(len(model.row_names)), sample.unwrapped)
+        if len(self.one_sided):
+            equations = self.acting(sample.acting)
+            model = equations.model
+        loading = system.loading_of(model, sample.t) if len(self.one_sided) else system.loading(self.factors(sample.t))
+        free = system.state_of(model, State(sample.q, sample.y, np.zeros(0), sample.unwrapped))
         point = equations.at(free, loading)
         forces = self.inertia.forces(sample.v, sample.a)
         balanced = self.inertia.loading(equations, free, equations.effective(free, loading), forces)
-        state = State(sample.q, sample.y, self._multipliers(equations, free, balanced), sample.unwrapped)
+        state = replace(free, lam=self._multipliers(equations, free, balanced))
         fields = Fields(equations, state, balanced)
         kinetic = self.inertia.kinetic(sample.v)
         return MotionState(
@@ -72,6 +76,16 @@ class Mover:
             energies=(kinetic, point.strain, point.potential - point.strain - fields.spent / model.scales.moment),
             mover=self,
         )
+
+    def acting(self, acting: Array) -> Equations:
+        """The equations of the model in which one-sided rows act as told, (rows,), 1 or 0."""
+        found = self._models.get(acting.tobytes())
+        if found is None:
+            model, stops = self.model, self.one_sided.stops(acting)
+            mesh = replace(model.mesh, stops=stops)
+            alone = assemble(model.scene, mesh, assembly=model.assembly, scales=model.scales, like=model)  # type: ignore[arg-type]
+            found = self._models[acting.tobytes()] = Equations(alone, kernels="interpreted")
+        return found
 
     @staticmethod
     def _multipliers(equations: Equations, free: State, balanced: Any) -> Array:
@@ -150,7 +164,9 @@ class MotionState(Configuration):
         ``loads`` is minus the present forces times displacements, so that the sum also changes while loads change.
         """
         kinetic, elastic, loads = (part * self.model.scales.moment for part in self.energies)
-        lost = {"dissipated": sum(self.fields.dissipated.values())} if self.fields.dissipated else {}
+        lost, spent = dict[str, float](), self.fields.dissipated
+        if spent or self.model.scene.stopped:
+            lost["dissipated"] = sum(spent.values()) + self.sample.lost * self.model.scales.moment
         return {"kinetic": kinetic, "elastic": elastic, **lost, "loads": loads, "total": kinetic + elastic + loads}
 
     @functools.cached_property

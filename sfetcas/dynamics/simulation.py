@@ -26,9 +26,11 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
+from ..mechanics.one_sided import all_stops, one_sided_of
 from ..stopping import arrived
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
 from .conserving import Conserving
+from .events import TOGETHER
 from .idas import Idas
 from .inertia import Inertia
 from .inertialess import check_balanced, check_resisted
@@ -125,7 +127,7 @@ class Simulation:
         meshing = Meshing(self.scene, settings)
         self.accuracy, self.asked, self.quantity = meshing.accuracy, meshing.asked, meshing.quantity
         self.prescribed = meshing.prescribed
-        self.mesh: Mesh = replace(meshing.target, places=True)
+        self.mesh: Mesh = replace(meshing.target, places=True, stops=all_stops(scene))
         self.seconds = {"model": 0.0, "build": 0.0, "solve": 0.0}
 
     # -- times ----------------------------------------------------------------------------------------
@@ -165,12 +167,13 @@ class Simulation:
         analysis = self.scene.analysis
         steps = USUAL_STEPS if before is None else 2 * before
         steps = steps if analysis.step is None else int(analysis.duration / analysis.step)
-        system = StageEquations(equations, masses, self.settings.kernels, calls=CALLS * max(steps, 1))
+        one_sided = one_sided_of(model)
+        system = StageEquations(equations, masses, self.settings.kernels, CALLS * max(steps, 1), one_sided)
         integrator = INTEGRATORS[self.name](system, self.progress)
         self.seconds["model"] += built - begin
         self.seconds["build"] += time.perf_counter() - built
-        begun, notes = self.begun(system)
         mover = Mover(equations, Inertia(system), masses.time, system.factors)
+        begun, notes = self.begun(system, mover.acting(np.zeros(len(one_sided))) if len(one_sided) else None)
         beyond = min((t for t in self._kinks if t >= analysis.duration), default=np.inf)
         watch = None if analysis.until is None else Watch(analysis.until, mover)
         times = self.times if watch is None else finer(self.times)
@@ -221,8 +224,10 @@ class Simulation:
             status = Status.OUTSIDE if instant.fields.beyond_tables() else Status.BENT
             raise SolveError(status, f"at {instant.time:.6g} s: {message}")
 
-    def begun(self, system: StageEquations) -> tuple[InitialState, tuple[str, ...]]:
-        """Where the motion begins, and what is to be said of it."""
+    def begun(
+        self, system: StageEquations, free: Equations | None = None
+    ) -> tuple[InitialState, tuple[str, ...]]:
+        """Where the motion begins, and what is to be said of it; ``free`` are equations without one-sided rows."""
         model = system.model
         state = at_rest(model)
         notes: tuple[str, ...] = ()
@@ -233,7 +238,11 @@ class Simulation:
         loading = system.loading(factors)
         state = equations.holding(state, loading)
         if any(member.turned is not None for member in self.scene.members.values()):
-            state, notes = shaped(equations, state, loading)
+            if free is not None:
+                loading = system.loading_of(free.model, 0.0)
+            found, notes = shaped(free or equations, system.state_of((free or equations).model, state), loading)
+            state = replace(found, lam=state.lam, unwrapped=model.unwrapping.angles(found.q, state.unwrapped))
+        touching = self._touching(system, state)
         if self.weightless:
             if self.name == "conserving":
                 message = (
@@ -241,12 +250,30 @@ class Simulation:
                 )
                 accepted = "accepted: radau-3, radau-2 or generalised-alpha, or a small rhoA"
                 raise SceneError(f"{message}, {accepted}", ("analysis", "integrator"))
-            beginning = _Beginning(system)
+            beginning = _Beginning(system, touching)
             if self.scene.analysis.initial == "equilibrium":
                 state = beginning.settled(state, factors)
             beginning.check(state, factors)
-        rates, more = velocities(system, equations, state)
-        return InitialState(state, rates, *system.rates(state, factors, rates)), (*notes, *more)
+        if free is not None:
+            equations = free
+        rates, more = velocities(system, equations, system.state_of(equations.model, state))
+        return InitialState(state, rates, *system.rates(state, factors, rates), touching), (*notes, *more)
+
+    def _touching(self, system: StageEquations, state: State) -> Array:
+        """One-sided rows that may act at the begin, (rows,), 1 or 0."""
+        rows = system.one_sided
+        if not len(rows):
+            return np.zeros(0)
+        if self.scene.analysis.initial == "equilibrium":
+            return rows.acting(self.before.model.mesh.stops)
+        opened = system.openings(state, 0.0)
+        worst = int(np.argmin(opened))
+        if opened[worst] < -TOGETHER:
+            table, name = rows.names[worst].split(".", 1)
+            missing = -opened[worst] * system.model.scales.length
+            message = f"found {missing:.3g} m shorter than its way at t = 0, accepted: as long, or initial = 'equilibrium'"
+            raise SceneError(message, (table, name))
+        return (opened <= TOGETHER).astype(float)
 
     @property
     def before(self) -> Equilibrium:
@@ -453,8 +480,11 @@ LOST = 0.05
 class _Beginning:
     """What acts at the begin, without velocities and accelerations, dimensionless."""
 
-    def __init__(self, system: StageEquations) -> None:
+    def __init__(self, system: StageEquations, touching: Array | None = None) -> None:
         n = system.layout
+        touching = np.zeros(len(system.one_sided)) if touching is None else touching
+        rows = system.one_sided.rows[touching == 0.0]
+        self._touching, self._idle = touching, system.equations.unknowns + rows
         q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
         factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
         stage = system.stage(q, y, lam, ca.MX.zeros(n.x), factors, unwrapped)
@@ -465,8 +495,11 @@ class _Beginning:
 
     def __call__(self, state: State, lam: Array, factors: Array) -> tuple[Array, Array, Array, Array]:
         """Stiffness with closings, masses and dampers, (total, total) each, and the sum of all forces (total,)."""
-        given = (state.q.T, state.y, lam, factors, self._system.counted(state))
+        given = (state.q.T, state.y, lam, factors, self._system.counted(state, self._touching))
         stiffness, mass, damping, forces = (np.array(part) for part in self._function.call([ca.DM(x) for x in given]))
+        # What does not act is a number of its own.
+        stiffness[self._idle], stiffness[:, self._idle] = 0.0, 0.0
+        stiffness[self._idle, self._idle] = 1.0
         return stiffness, mass, damping, forces.ravel()
 
     def check(self, state: State, factors: Array) -> None:

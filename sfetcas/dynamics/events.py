@@ -1,0 +1,414 @@
+"""Events of a motion with one-sided rows: when rows begin and cease to act, and what an impact does to velocities.
+
+Each one-sided row has an opening, which is not below zero, and a force, which is not either; one of them is zero.
+Between events the motion is that of a system in which the rows that act are constraints, and the others are absent.
+
+- The force of a row falls through zero: it ceases to act.  Velocities do not change.
+- The opening of a row falls through zero: an impact.  Velocities ``w`` of the unknowns change by impulses ``p`` along
+  the rows ``H`` that act or close, so that none closes further,
+
+      M (w+ - w) = H^T p,      p >= 0,      H w+ >= 0,      p . H w+ = 0,
+
+  without rebound.  It is the velocity nearest to ``w`` in the metric of the masses ``M`` that all rows allow (Gauss's
+  principle of least constraint), and what is lost is ``1/2 (w - w+).M (w - w+)``, never below zero.
+
+After either of them the rows that stay closed are those whose forces are not below zero at once.
+
+Times are those at which a step from the begin of the present one ends at zero, so that they are as accurate as steps
+are.  Forces are multipliers of rows, whose order in the length of the step is less than that of positions; where they
+decide they are those of a short step from there, from velocities that the rows allow.
+
+Source: Moreau, Unilateral contact and dry friction in finite freedom dynamics, in: Nonsmooth Mechanics and
+Applications, CISM 302 (1988); Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts (1996).
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+from scipy.optimize import brentq, nnls
+
+from ..errors import SolveError, Status
+from ..mathematics.arrays import Array, Index
+from ..mathematics.interpolation import evaluation
+from ..mechanics.equations import State
+from .integrating import Memory, Passed, Stepper, Taken
+from .sampling import turned_by
+
+__all__ = ["Event", "Events"]
+
+
+@dataclass(frozen=True)
+class Event:
+    """What happens to a row; everything is dimensionless.
+
+    Attributes
+    ----------
+    t : float
+    row : int
+        Its number among the one-sided ones.
+    acts : bool
+        Whether it acts from then on.
+    impulse : float
+        Along the row.
+    lost : float
+        The energy that all impulses of that time take away, at the first of them; else zero.
+    """
+
+    t: float
+    row: int
+    acts: bool
+    impulse: float
+    lost: float
+
+
+class Events:
+    """Finds the events within time steps, and the states after them.
+
+    Parameters
+    ----------
+    stepper : Stepper
+        Of a system with one-sided rows.
+
+    Attributes
+    ----------
+    found : list of Event
+    """
+
+    def __init__(self, stepper: Stepper) -> None:
+        self.stepper, self.system = stepper, stepper.system
+        self.rows, self.signs = self.system.one_sided.rows, self.system.one_sided.signs
+        self.found: list[Event] = []
+        self._offset, self._in_a_row = np.zeros(len(self.rows)), 0
+
+    # -- begin ----------------------------------------------------------------------------------------
+
+    def begun(self, memory: Memory, h: float) -> Memory:
+        """The state after what happens at the begin, where the rows that it calls acting are those that touch.
+
+        ``h`` is the expected length of a step.
+        """
+        touching = memory.acting > 0.0
+        idle = replace(memory, acting=np.zeros(len(self.rows)))
+        return self._after(idle, touching, np.zeros(len(self.rows), bool), h)
+
+    # -- within a step --------------------------------------------------------------------------------
+
+    def within(self, taken: Taken) -> Passed | None:
+        """What happens first in a step that was taken; None where nothing does."""
+        closing, released = self._closing(taken), self._released(taken)
+        if closing is None and released is None:
+            self._in_a_row = 0
+            return None
+        self._in_a_row += 1
+        if self._in_a_row > MOST:
+            seconds = taken.begin.t * self.stepper.time
+            names = ", ".join(dict.fromkeys(self.system.one_sided.names[event.row] for event in self.found[-MOST:]))
+            detail = f"at {seconds:.9g} s one impact or release follows another without end, of {names}"
+            raise SolveError(Status.STOPPED, detail, taken.begin)
+        share = min(one for one in (closing, released) if one is not None)
+        steps = self._advanced(taken, share) if share * taken.h > SHORT else []
+        memory = steps[-1].after if steps else taken.begin
+        acting = memory.acting > 0.0
+        if released is None or share < released:
+            closes = ~acting & (self._openings(memory) <= TOGETHER)
+            return Passed(steps, self._after(memory, closes, np.zeros(len(acting), bool), taken.h))
+        forces = np.where(acting, self._forces(memory, taken.h)[0], np.inf)
+        ceases = np.arange(len(acting)) == np.argmin(forces)
+        return Passed(steps, self._after(memory, np.zeros(len(acting), bool), ceases, taken.h))
+
+    def _at(self, taken: Taken, share: float) -> Memory:
+        """The state after a share of a step that was taken."""
+        if share == 1.0 and self.stepper.method.stages > 1:
+            return taken.after
+        return self._advanced(taken, share)[-1].after if share * taken.h > SHORT else taken.begin
+
+    def _advanced(self, taken: Taken, share: float) -> list[Taken]:
+        """Steps from the begin of one that was taken over a share of it.
+
+        Of a method with one stage it takes several, between which the motion can be interpolated.
+        """
+        count = 1 if self.stepper.method.stages > 1 else PARTS
+        memory, steps = taken.begin, list[Taken]()
+        for _ in range(count):
+            steps.append(self.stepper.step(memory, share * taken.h / count))
+            if not steps[-1].converged:
+                seconds = taken.begin.t * self.stepper.time
+                raise SolveError(Status.STOPPED, f"no event could be located after {seconds:.9g} s", taken.begin)
+            memory = steps[-1].after
+        return steps
+
+    def _closing(self, taken: Taken) -> float | None:
+        """Share of a step after which the first row closes; None where none does."""
+        idle = taken.begin.acting == 0.0
+        if not idle.any():
+            return None
+        shares, values = self._course(taken)
+        missing = (values[:, idle] + self._offset[idle] + ROUNDING).min(axis=1)
+        if missing[0] < 0.0:
+            return 0.0
+        nearest = self._dips(taken, shares, missing, idle)
+        if nearest is None:
+            return None
+
+        def left(share: float) -> float:
+            return float((self._openings(self._at(taken, share))[idle] + ROUNDING).min())
+
+        low = 0.0
+        for high in (*nearest, *shares[shares > nearest[-1]].tolist()):
+            if left(high) < 0.0:
+                return float(brentq(left, low, high, xtol=XTOL)) if left(low) > 0.0 else low
+            low = high
+        return None
+
+    def _dips(self, taken: Taken, shares: Array, missing: Array, idle: Array) -> list[float] | None:
+        """Shares of a step between which the first row closes, as interpolated; the begin is left out."""
+        for k in range(1, len(shares)):
+            if missing[k] < 0.0:
+                return [*([shares[k - 1]] if k > 1 else []), shares[k]]
+            if k < len(shares) - 1 and missing[k] < missing[k - 1] and missing[k] <= missing[k + 1]:
+                # Between three of them the parabola through them says where it is least.
+                a, b = missing[k - 1] - missing[k], missing[k + 1] - missing[k]
+                at = float(shares[k] + 0.5 * (a - b) / max(a + b, TINY) * (shares[k + 1] - shares[k]))
+                lowest = self._interpolated(taken, at)[idle] + self._offset[idle] + ROUNDING
+                if lowest.min() < 0.0:
+                    return [shares[k - 1], at] if k > 1 else [at]
+        return None
+
+    def _course(self, taken: Taken) -> tuple[Array, Array]:
+        """Shares of a step (n,), evenly spaced, and the interpolated openings (n, rows) there."""
+        shares = np.linspace(0.0, 1.0, LOOKS + 1)
+        found = [self._interpolated(taken, share) for share in shares[:-1].tolist()]
+        return shares, np.array([*found, self._opened(taken.after.q, taken.after.y, taken.after.t, taken.after)])
+
+    def _interpolated(self, taken: Taken, share: float) -> Array:
+        """The openings (rows,) at a share of a step, by the polynomial through its stages."""
+        begin, last = taken.begin, taken.begin.last
+        nodes = np.array([0.0, *taken.places])
+        turns = np.concatenate([np.zeros((1, *taken.turns.shape[1:])), taken.turns])
+        shifts = np.concatenate([np.zeros((1, taken.shifts.shape[1])), taken.shifts])
+        if len(taken.places) == 1 and last is not None:
+            # One stage alone makes a line.
+            nodes = np.array([-last.h / taken.h, *nodes])
+            turns = np.concatenate([-last.turns[-1:], turns])
+            shifts = np.concatenate([-last.shifts[-1:], shifts])
+        row = evaluation(nodes, np.array([share]))[0]
+        q = turned_by(begin.q, np.einsum("n,nra->ra", row, turns))
+        return self._opened(q, begin.y + row @ shifts, begin.t + share * taken.h, begin)
+
+    def _released(self, taken: Taken) -> float | None:
+        """Share of a step after which the first row ceases to act; None where none does."""
+        begin, h = taken.begin, taken.h
+        acting = begin.acting > 0.0
+        if not acting.any():
+            return None
+        at_stages = (self.signs * taken.lam[:, self.rows])[:, acting]
+        before = (self.signs * begin.lam[self.rows])[acting]
+        # Forces of stages are not as accurate as what decides: it is asked for also where they only come near to zero.
+        doubtful = [
+            float(place)
+            for place, forces in zip(taken.places, at_stages, strict=True)
+            if (forces < 0.0).any() or (place == 1.0 and (2.0 * forces < before).any())
+        ]
+
+        def left(share: float) -> float:
+            return self._least(self._at(taken, share), h)
+
+        for share in doubtful:
+            if left(share) < 0.0:
+                return float(brentq(left, 0.0, share, xtol=XTOL)) if left(0.0) > 0.0 else 0.0
+        return None
+
+    def _least(self, memory: Memory, h: float) -> float:
+        """The least force of a row that acts, over that which is rounding."""
+        forces, _, rounding = self._forces(self._consistent(memory), h)
+        return float(forces[memory.acting > 0.0].min()) + rounding
+
+    # -- states ---------------------------------------------------------------------------------------
+
+    def _after(self, memory: Memory, closes: Array, ceases: Array, h: float) -> Memory:
+        """The state after an event at which rows close or cease to act, both (rows,) of bool."""
+        before = memory.acting > 0.0
+        collision = _Collision(self, memory)
+        velocity, impulses, touching, lost = collision.solved(before, closes)
+        there = replace(memory, rates=_with_velocity(memory.rates, velocity), last=None, lost=memory.lost + lost)
+        acting, lam = self._settled(there, touching & ~ceases, touching, h)
+        there = replace(there, acting=acting.astype(float), lam=lam)
+        self._offset = np.where(acting, 0.0, np.maximum(-self._opened(there.q, there.y, there.t, there), 0.0))
+        for i in np.flatnonzero((acting != before) | (impulses > 0.0)).tolist():
+            self.found.append(Event(memory.t, i, bool(acting[i]), float(impulses[i]), lost))
+            lost = 0.0
+        return there
+
+    def _settled(self, memory: Memory, acting: Array, touching: Array, h: float) -> tuple[Array, Array]:
+        """Which of the rows that touch act from now on, (rows,) of bool, and all multipliers."""
+        if not touching.any():
+            return acting, np.zeros(len(memory.lam))
+        tried: set[bytes] = set()
+        while acting.tobytes() not in tried:
+            tried.add(acting.tobytes())
+            now = replace(memory, acting=acting.astype(float))
+            forces, opened, rounding = self._forces(now, h)
+            forces = np.where(acting, forces, np.inf)
+            worst = int(np.argmin(forces))
+            if forces[worst] < -rounding:
+                acting = acting & (np.arange(len(acting)) != worst)
+                continue
+            closed = np.where(touching & ~acting, opened, np.inf)
+            worst = int(np.argmin(closed))
+            if closed[worst] >= -ROUNDING:
+                lam = np.zeros(len(memory.lam))
+                lam[self.rows] = self.signs * np.where(acting, forces, 0.0)
+                return acting, lam
+            acting = acting | (np.arange(len(acting)) == worst)
+        seconds = memory.t * self.stepper.time
+        names = ", ".join(np.array(self.system.one_sided.names)[touching].tolist())
+        raise SolveError(Status.STOPPED, f"at {seconds:.9g} s no choice of what acts holds, of {names}", memory)
+
+    def _consistent(self, memory: Memory) -> Memory:
+        """The state with the nearest velocities that all acting rows allow."""
+        acting = memory.acting > 0.0
+        velocity, *_ = _Collision(self, memory).solved(acting, np.zeros(len(acting), bool))
+        return replace(memory, rates=_with_velocity(memory.rates, velocity), last=None)
+
+    def _forces(self, memory: Memory, h: float) -> tuple[Array, Array, float]:
+        """Forces of the rows (rows,) just after a state, what is rounding of them, and openings a little later."""
+        h = min(h, max(SHARE * h, LEAST))
+        short = self.stepper.starter
+        taken = short.step(replace(memory, last=None, rates=memory.rates[: short.method.kept]), h)
+        if not taken.converged:
+            seconds = memory.t * self.stepper.time
+            raise SolveError(Status.STOPPED, f"Newton's method did not converge at {seconds:.6g} s", memory)
+        forces = self.signs * (evaluation(taken.places, np.zeros(1))[0] @ taken.lam)[self.rows]
+        most = float(np.abs(forces * memory.acting).max(initial=0.0))
+        rounding = float(np.finfo(float).eps) * ROUNDED / h**2 + RELATIVE * most
+        return forces, self._openings(taken.after), rounding
+
+    def _openings(self, memory: Memory) -> Array:
+        return self._opened(memory.q, memory.y, memory.t, memory) + self._offset
+
+    def _opened(self, q: Array, y: Array, t: float, near: Memory) -> Array:
+        """The openings (rows,) at a state; angles that count turns are those near a state."""
+        return self.system.openings(State(q, y, near.lam, near.unwrapped), t)
+
+    @functools.cached_property
+    def momenta(self) -> ca.Function:
+        """(q, y, factors, unwrapped, v) -> Jacobian of the rows, masses of the unknowns, and momenta of velocities v
+        of the quantities, by the unknowns.
+        """
+        system, n = self.system, self.system.layout
+        q, y, v = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("v", n.x)
+        factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
+        nothing = ca.MX.zeros(n.lam)
+        still, forces = ca.MX.zeros(n.x, 1), system.forces(ca.MX.zeros(n.x, 1), v)
+        moving, resting = (system.stage(q, y, nothing, part, factors, unwrapped) for part in (forces, still))
+        unknowns = system.equations.unknowns
+        rows = system.static_matrix(resting)[unknowns:, :unknowns]
+        mass = system.coupling_matrix(resting, 0.0, 1.0)[:unknowns, :unknowns]
+        found = [rows, mass, (moving.residual - resting.residual)[:unknowns]]
+        return ca.Function("momenta", [q, y, factors, unwrapped, v], found)
+
+
+class _Collision:
+    """Masses and rows at a state, and the velocities after impulses along the rows."""
+
+    def __init__(self, events: Events, memory: Memory) -> None:
+        system, seconds = events.system, memory.t * events.stepper.time
+        self._system, self._rows, self._signs = system, events.rows, events.signs
+        self._state = State(memory.q, memory.y, memory.lam, memory.unwrapped)
+        self._factors = system.factors(memory.t)
+        rates = [0.0 if history is None else history.rate(seconds) for history in system.histories]
+        self._faster = np.array(rates) * events.stepper.time
+        still = np.zeros(system.equations.unknowns)
+        _, _, drift, self._opening = system.rates_at(self._state, self._factors, still, self._faster)
+        given = self._state.q.T, memory.y, self._factors, system.counted(self._state)
+        rows, mass, momentum = (np.array(part) for part in events.momenta(*given, memory.rates[0] - drift))
+        # In units in which each unknown has the mass one, or none.
+        diagonal = np.abs(np.diag(mass))
+        self._unit = 1.0 / np.sqrt(np.maximum(diagonal, MASSLESS * diagonal.max(initial=TINY)))
+        self._jacobian, self._momentum = rows * self._unit, momentum.ravel() * self._unit
+        self._mass = mass * self._unit * self._unit[:, None] + MASSLESS * np.eye(len(mass))
+
+    def solved(self, before: Array, closes: Array) -> tuple[Array, Array, Array, float]:
+        """Velocities (quantities,) after the event, impulses, which rows touch then, and the energy that is lost.
+
+        ``before`` and ``closes`` are the rows that act and those that close, (rows,) of bool.
+        """
+        always = np.setdiff1d(np.arange(len(self._jacobian)), self._rows)
+        held = np.concatenate([always, self._rows[before]])
+        w = self._onto(held, self._momentum[:, None], -self._opening[held])[:, 0]
+        impulses, taking, lost = np.zeros(len(before)), np.flatnonzero(before | closes), 0.0
+        touching = before.copy()
+        if closes.any():
+            chosen = self._signs[taking, None] * self._jacobian[self._rows[taking]]
+            speed = chosen @ w + self._signs[taking] * self._opening[self._rows[taking]]
+            speed[before[taking]] = 0.0
+            back = self._onto(always, chosen.T, np.zeros(len(always)))
+            found = _complementary(chosen @ back, speed)
+            w = w - back @ found
+            left = speed - chosen @ back @ found
+            impulses[taking] = found
+            touching[taking] = (found > 0.0) | (left > -SLOW * np.abs(speed).max())
+            lost = 0.5 * float(found @ chosen @ back @ found)
+        _, _, velocity, _ = self._system.rates_at(self._state, self._factors, w * self._unit, self._faster)
+        return velocity, impulses, touching, lost
+
+    def _onto(self, rows: Index, momenta: Array, opening: Array) -> Array:
+        """Velocities (unknowns, n) for momenta (unknowns, n) under which rows open at given rates (rows,)."""
+        held = self._jacobian[rows]
+        size = np.maximum(np.linalg.norm(held, axis=1), TINY)
+        held, n = held / size[:, None], len(self._mass)
+        matrix = np.block([[self._mass, held.T], [held, -MASSLESS * np.eye(len(rows))]])
+        right = np.vstack([momenta, np.repeat((opening / size)[:, None], momenta.shape[1], axis=1)])
+        return np.asarray(np.linalg.solve(matrix, right)[:n])
+
+
+def _complementary(yielding: Array, speed: Array) -> Array:
+    """The impulses (n,), none below zero, that leave no speed above zero: ``speed - yielding p <= 0``, zero where p > 0.
+
+    ``yielding`` (n, n) is symmetric and has no eigenvalue below zero.
+    """
+    values, vectors = np.linalg.eigh(0.5 * (yielding + yielding.T))
+    root = np.sqrt(np.maximum(values, MASSLESS * values.max(initial=TINY)))
+    return np.asarray(nnls(root[:, None] * vectors.T, (vectors.T @ speed) / root)[0])
+
+
+def _with_velocity(rates: Array, velocity: Array) -> Array:
+    return np.vstack([velocity[None, :], rates[1:]])
+
+
+MOST = 50
+"""Events in a row, without a whole step between them."""
+
+PARTS = 4
+"""Steps of a method with one stage up to an event."""
+
+LOOKS = 8
+"""Parts of a step at whose ends openings are looked at."""
+
+ROUNDING = 1e-12
+"""Of openings, unit of length or rad."""
+
+TOGETHER = 1e-9
+"""Opening, unit of length or rad, up to which a row closes at the same time as another one."""
+
+SLOW = 1e-9
+"""Speed of opening, over the largest closing speed, up to which a row stays closed in an impact."""
+
+SHORT = 1e-8
+"""Time, dimensionless, up to which an event is at the begin of a step: rounding would decide the rates of a shorter one."""
+
+XTOL = 1e-13
+"""Share of a step to which an event is located."""
+
+SHARE, LEAST = 0.05, 3e-4
+"""Share of a step in which forces are found, and its least length, dimensionless, for the sake of rounding."""
+
+ROUNDED, RELATIVE = 10.0, 1e-9
+"""Forces that are rounding: rounding of places over the square of the step, and the share of the largest force."""
+
+MASSLESS, TINY = 1e-12, 1e-300
+"""Share of the largest mass that counts as none; and what is divided by instead of zero."""
