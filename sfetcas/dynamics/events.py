@@ -29,6 +29,7 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
+from scipy.linalg import lu_factor, lu_solve
 from scipy.optimize import brentq, nnls
 
 from ..errors import SolveError, Status
@@ -326,9 +327,9 @@ class _Collision:
         _, _, drift, self._opening = system.rates_at(self._state, self._factors, still, self._faster)
         given = self._state.q.T, memory.y, self._factors, system.counted(self._state)
         rows, mass, momentum = (np.array(part) for part in events.momenta(*given, memory.rates[0] - drift))
-        # In units in which each unknown has the mass one, or none.
+        # In units in which each unknown has the mass one, but where it has next to none.
         diagonal = np.abs(np.diag(mass))
-        self._unit = 1.0 / np.sqrt(np.maximum(diagonal, MASSLESS * diagonal.max(initial=TINY)))
+        self._unit = 1.0 / np.sqrt(np.maximum(diagonal, LIGHT * diagonal.max(initial=TINY)))
         self._jacobian, self._momentum = rows * self._unit, momentum.ravel() * self._unit
         self._mass = mass * self._unit * self._unit[:, None] + MASSLESS * np.eye(len(mass))
 
@@ -361,9 +362,15 @@ class _Collision:
         held = self._jacobian[rows]
         size = np.maximum(np.linalg.norm(held, axis=1), TINY)
         held, n = held / size[:, None], len(self._mass)
-        matrix = np.block([[self._mass, held.T], [held, -MASSLESS * np.eye(len(rows))]])
         right = np.vstack([momenta, np.repeat((opening / size)[:, None], momenta.shape[1], axis=1)])
-        return np.asarray(np.linalg.solve(matrix, right)[:n])
+        matrix = np.block([[self._mass, held.T], [held, np.zeros((len(rows),) * 2)]])
+        # Rows that depend on each other leave multipliers open: a small diagonal, which is then taken out again.
+        regular = matrix - np.diag(np.repeat([0.0, DUAL], [n, len(rows)]))
+        factors = lu_factor(regular)
+        found = lu_solve(factors, right)
+        for _ in range(REFINED):
+            found += lu_solve(factors, right - matrix @ found)
+        return np.asarray(found[:n])
 
 
 def _complementary(yielding: Array, speed: Array) -> Array:
@@ -410,5 +417,10 @@ SHARE, LEAST = 0.05, 3e-4
 ROUNDED, RELATIVE = 10.0, 1e-9
 """Forces that are rounding: rounding of places over the square of the step, and the share of the largest force."""
 
-MASSLESS, TINY = 1e-12, 1e-300
-"""Share of the largest mass that counts as none; and what is divided by instead of zero."""
+LIGHT, MASSLESS, TINY = 1e-6, 1e-12, 1e-300
+"""Share of the largest mass below which an unknown keeps it in its unit, and of a unit that counts as no mass; and what
+is divided by instead of zero.
+"""
+
+DUAL, REFINED = 1e-12, 3
+"""Diagonal of the rows, whose gradients are of length one, and rounds in which what it does is taken out again."""
