@@ -36,7 +36,7 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import Array, Index
 from ..mathematics.interpolation import evaluation
 from ..mechanics.equations import State
-from .integrating import Memory, Passed, Stepper, Taken
+from .integrating import SHORTEST, Memory, Passed, Stepper, Taken
 from .sampling import turned_by
 
 __all__ = ["Event", "Events"]
@@ -111,13 +111,13 @@ class Events:
             detail = f"at {seconds:.9g} s one impact or release follows another without end, of {names}"
             raise SolveError(Status.STOPPED, detail, taken.begin)
         share = min(one for one in (closing, released) if one is not None)
-        steps = self._advanced(taken, share) if share * taken.h > SHORT else []
+        steps = self._advanced(taken, share) if share * taken.h > SHORTEST else []
         memory = steps[-1].after if steps else taken.begin
         acting = memory.acting > 0.0
         if released is None or share < released:
             closes = ~acting & (self._openings(memory) <= TOGETHER)
             return Passed(steps, self._after(memory, closes, np.zeros(len(acting), bool), taken.h))
-        forces = np.where(acting, self._forces(memory, taken.h)[0], np.inf)
+        forces = np.where(acting, self._forces(self._consistent(memory), self._length(taken.h))[0], np.inf)
         ceases = np.arange(len(acting)) == np.argmin(forces)
         return Passed(steps, self._after(memory, np.zeros(len(acting), bool), ceases, taken.h))
 
@@ -125,7 +125,7 @@ class Events:
         """The state after a share of a step that was taken."""
         if share == 1.0 and self.stepper.method.stages > 1:
             return taken.after
-        return self._advanced(taken, share)[-1].after if share * taken.h > SHORT else taken.begin
+        return self._advanced(taken, share)[-1].after if share * taken.h > SHORTEST else taken.begin
 
     def _advanced(self, taken: Taken, share: float) -> list[Taken]:
         """Steps from the begin of one that was taken over a share of it.
@@ -220,12 +220,12 @@ class Events:
 
         for share in doubtful:
             if left(share) < 0.0:
-                return float(brentq(left, 0.0, share, xtol=XTOL)) if left(0.0) > 0.0 else 0.0
+                return float(brentq(left, 0.0, share, xtol=RELEASED)) if left(0.0) > 0.0 else 0.0
         return None
 
     def _least(self, memory: Memory, h: float) -> float:
         """The least force of a row that acts, over that which is rounding."""
-        forces, _, rounding = self._forces(self._consistent(memory), h)
+        forces, _, rounding = self._forces(self._consistent(memory), self._length(h))
         return float(forces[memory.acting > 0.0].min()) + rounding
 
     # -- states ---------------------------------------------------------------------------------------
@@ -249,10 +249,14 @@ class Events:
         if not touching.any():
             return acting, np.zeros(len(memory.lam))
         tried: set[bytes] = set()
-        while acting.tobytes() not in tried:
+        h = self._length(h)
+        while h > SHORTEST:
+            if acting.tobytes() in tried:
+                # Waves that are shorter than this make what is true at once untrue a little later.
+                tried.clear()
+                h *= SHORTER
             tried.add(acting.tobytes())
-            now = replace(memory, acting=acting.astype(float))
-            forces, opened, rounding = self._forces(now, h)
+            forces, opened, rounding = self._forces(replace(memory, acting=acting.astype(float)), h)
             forces = np.where(acting, forces, np.inf)
             worst = int(np.argmin(forces))
             if forces[worst] < -rounding:
@@ -275,9 +279,13 @@ class Events:
         velocity, *_ = _Collision(self, memory).solved(acting, np.zeros(len(acting), bool))
         return replace(memory, rates=_with_velocity(memory.rates, velocity), last=None)
 
+    @staticmethod
+    def _length(h: float) -> float:
+        """Length of a short step where steps have the length h."""
+        return min(h, max(SHARE * h, LEAST))
+
     def _forces(self, memory: Memory, h: float) -> tuple[Array, Array, float]:
-        """Forces of the rows (rows,) just after a state, what is rounding of them, and openings a little later."""
-        h = min(h, max(SHARE * h, LEAST))
+        """Forces of the rows (rows,) just after a state, openings at the end of a short step, and what is rounding."""
         short = self.stepper.starter
         taken = short.step(replace(memory, last=None, rates=memory.rates[: short.method.kept]), h)
         if not taken.converged:
@@ -405,14 +413,13 @@ TOGETHER = 1e-9
 SLOW = 1e-9
 """Speed of opening, over the largest closing speed, up to which a row stays closed in an impact."""
 
-SHORT = 1e-8
-"""Time, dimensionless, up to which an event is at the begin of a step: rounding would decide the rates of a shorter one."""
+XTOL, RELEASED = 1e-13, 1e-7
+"""Shares of a step to which an impact is located, and a release: the force being near zero, that errs by their cube."""
 
-XTOL = 1e-13
-"""Share of a step to which an event is located."""
-
-SHARE, LEAST = 0.05, 3e-4
-"""Share of a step in which forces are found, and its least length, dimensionless, for the sake of rounding."""
+SHARE, LEAST, SHORTER = 0.05, 3e-4, 0.2
+"""Share of a step in which forces are found, its least length, dimensionless, for the sake of rounding, and by what it is
+shorter where they tell nothing.
+"""
 
 ROUNDED, RELATIVE = 10.0, 1e-9
 """Forces that are rounding: rounding of places over the square of the step, and the share of the largest force."""

@@ -13,19 +13,12 @@ from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
 from .events import Event, Events
-from .integrating import Memory, Stepper, Taken, integrate
+from .integrating import SHORTEST, Memory, Stepper, Taken, integrate
 from .methods import Method
 from .sampling import Sample, Sampler, StepRecord
 from .stages import StageEquations
 
-__all__ = ["SHORTEST", "InitialState", "Integrator", "Stages", "TimeGrid"]
-
-SHORTEST = 5e-7
-"""Shortest step, in the unit of time: rounding of places over its square is a thousandth of what accelerates.
-
-It dies away from step to step then; of a tenth of this step it is much of what accelerates, and grows.
-"""
-
+__all__ = ["InitialState", "Integrator", "Stages", "TimeGrid"]
 
 @dataclass(frozen=True, eq=False)
 class InitialState:

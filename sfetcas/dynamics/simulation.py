@@ -34,7 +34,8 @@ from .events import TOGETHER
 from .idas import Idas
 from .inertia import Inertia
 from .inertialess import check_balanced, check_resisted
-from .integrators import SHORTEST, InitialState, Integrator, Stages, TimeGrid
+from .integrating import SHORTEST
+from .integrators import InitialState, Integrator, Stages, TimeGrid
 from .methods import GeneralisedAlpha, Radau
 from .motion import MotionState, Mover, Trajectory
 from .sampling import StepRecord
