@@ -73,17 +73,22 @@ class Events:
     ----------
     stepper : Stepper
         Of a system with one-sided rows.
+    span : float
+        Dimensionless time of the whole motion.
 
     Attributes
     ----------
     found : list of Event
     """
 
-    def __init__(self, stepper: Stepper) -> None:
-        self.stepper, self.system = stepper, stepper.system
+    def __init__(self, stepper: Stepper, span: float) -> None:
+        self.stepper, self.system, self._span = stepper, stepper.system, span
         self.rows, self.signs = self.system.one_sided.rows, self.system.one_sided.signs
         self.found: list[Event] = []
-        self._offset, self._in_a_row = np.zeros(len(self.rows)), 0
+        self._offset = np.zeros(len(self.rows))
+        # Times of events, and the times and speeds of impacts.
+        self._times: list[float] = []
+        self._hits: list[tuple[float, float]] = []
 
     # -- begin ----------------------------------------------------------------------------------------
 
@@ -94,7 +99,9 @@ class Events:
         """
         touching = memory.acting > 0.0
         idle = replace(memory, acting=np.zeros(len(self.rows)))
-        return self._after(idle, touching, np.zeros(len(self.rows), bool), h)
+        after = self._after(idle, touching, np.zeros(len(self.rows), bool), h)
+        self.found[:] = [event for event in self.found if event.impulse]
+        return after
 
     # -- within a step --------------------------------------------------------------------------------
 
@@ -102,14 +109,8 @@ class Events:
         """What happens first in a step that was taken; None where nothing does."""
         closing, released = self._closing(taken), self._released(taken)
         if closing is None and released is None:
-            self._in_a_row = 0
             return None
-        self._in_a_row += 1
-        if self._in_a_row > MOST:
-            seconds = taken.begin.t * self.stepper.time
-            names = ", ".join(dict.fromkeys(self.system.one_sided.names[event.row] for event in self.found[-MOST:]))
-            detail = f"at {seconds:.9g} s one impact or release follows another without end, of {names}"
-            raise SolveError(Status.STOPPED, detail, taken.begin)
+        self._refuse_endless(taken.begin)
         share = min(one for one in (closing, released) if one is not None)
         steps = self._advanced(taken, share) if share * taken.h > SHORTEST else []
         memory = steps[-1].after if steps else taken.begin
@@ -126,6 +127,22 @@ class Events:
         if share == 1.0 and self.stepper.method.stages > 1:
             return taken.after
         return self._advanced(taken, share)[-1].after if share * taken.h > SHORTEST else taken.begin
+
+    def _refuse_endless(self, memory: Memory) -> None:
+        """Refuse events that follow each other without an end of them in sight."""
+        self._times.append(memory.t)
+        if len(self._times) > MOST and memory.t - self._times[-MOST - 1] < BRIEF * self._span:
+            seconds = memory.t * self.stepper.time
+            names = ", ".join(dict.fromkeys(self.system.one_sided.names[event.row] for event in self.found[-MOST:]))
+            detail = f"at {seconds:.9g} s one impact or release follows another, {MOST} of them, of {names}"
+            raise SolveError(Status.STOPPED, detail, memory)
+
+    def _ebbs(self, t: float, speed: float) -> bool:
+        """Whether an impact is one of infinitely many that come ever closer: rows that it goes between stay closed."""
+        self._hits = [*self._hits[-REPEATED:], (t, speed)]
+        times, speeds = np.array(self._hits).T
+        falling = len(speeds) > REPEATED and bool((np.diff(speeds) < 0.0).all() and (np.diff(times, 2) < 0.0).all())
+        return falling and speed * (times[-1] - times[-2]) < EBBED
 
     def _advanced(self, taken: Taken, share: float) -> list[Taken]:
         """Steps from the begin of one that was taken over a share of it.
@@ -234,6 +251,9 @@ class Events:
         """The state after an event at which rows close or cease to act, both (rows,) of bool."""
         before = memory.acting > 0.0
         collision = _Collision(self, memory)
+        speed = collision.speed(before, closes)
+        if speed > 0.0 and self._ebbs(memory.t, speed):
+            before, closes = before | closes, np.zeros(len(before), bool)
         velocity, impulses, touching, lost = collision.solved(before, closes)
         there = replace(memory, rates=_with_velocity(memory.rates, velocity), last=None, lost=memory.lost + lost)
         acting, lam = self._settled(there, touching & ~ceases, touching, h)
@@ -341,14 +361,30 @@ class _Collision:
         self._jacobian, self._momentum = rows * self._unit, momentum.ravel() * self._unit
         self._mass = mass * self._unit * self._unit[:, None] + MASSLESS * np.eye(len(mass))
 
+    @functools.cached_property
+    def _always(self) -> Index:
+        """The rows that are on no side."""
+        return np.setdiff1d(np.arange(len(self._jacobian)), self._rows)
+
+    def _allowed(self, before: Array) -> Array:
+        """The nearest velocities (unknowns,) under which no row opens or closes that acts."""
+        held = np.concatenate([self._always, self._rows[before]])
+        return self._onto(held, self._momentum[:, None], -self._opening[held])[:, 0]
+
+    def speed(self, before: Array, closes: Array) -> float:
+        """The largest speed with which a row closes; arguments as of :meth:`solved`."""
+        if not closes.any():
+            return 0.0
+        rows = self._rows[closes]
+        return float((self._signs[closes] * (self._jacobian[rows] @ self._allowed(before) + self._opening[rows])).max())
+
     def solved(self, before: Array, closes: Array) -> tuple[Array, Array, Array, float]:
         """Velocities (quantities,) after the event, impulses, which rows touch then, and the energy that is lost.
 
         ``before`` and ``closes`` are the rows that act and those that close, (rows,) of bool.
         """
-        always = np.setdiff1d(np.arange(len(self._jacobian)), self._rows)
-        held = np.concatenate([always, self._rows[before]])
-        w = self._onto(held, self._momentum[:, None], -self._opening[held])[:, 0]
+        always = self._always
+        w = self._allowed(before)
         impulses, taking, lost = np.zeros(len(before)), np.flatnonzero(before | closes), 0.0
         touching = before.copy()
         if closes.any():
@@ -395,8 +431,13 @@ def _with_velocity(rates: Array, velocity: Array) -> Array:
     return np.vstack([velocity[None, :], rates[1:]])
 
 
-MOST = 50
-"""Events in a row, without a whole step between them."""
+MOST, BRIEF = 200, 1e-3
+"""Events that are too many within this share of the motion."""
+
+REPEATED, EBBED = 4, 1e-8
+"""Impacts, each weaker and sooner than the one before, and the way between them, unit of length or rad, at which they are
+over.
+"""
 
 PARTS = 4
 """Steps of a method with one stage up to an event."""

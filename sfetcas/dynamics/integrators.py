@@ -148,7 +148,7 @@ class Stages(Integrator):
         memory = Memory(0.0, *given, remembered=begin, acting=begun.touching)
         self._sampler, self.record = Sampler(course.times, method.stages), StepRecord(method.stages)
         first = None if course.step is not None else max(FIRST * course.end, min(course.end, SHORTEST))
-        events = Events(stepper) if len(self.system.one_sided) else None
+        events = Events(stepper, course.end) if len(self.system.one_sided) else None
         if events is not None:
             self.events = events.found
             memory = events.begun(memory, course.step or first or course.end)

@@ -30,10 +30,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..pictures.animation import Animation
+    from .events import Event
     from .inertia import Inertia
     from .sampling import Sample, StepRecord
 
-__all__ = ["MotionState", "Mover", "Trajectory"]
+__all__ = ["MotionState", "Mover", "StopEvent", "Trajectory"]
 
 
 class Mover:
@@ -47,6 +48,14 @@ class Mover:
         self.model: Model = equations.model
         self.memory, self.one_sided = Remembering(self.model), inertia.system.one_sided
         self._models: dict[bytes, Equations] = {}
+
+    def event(self, event: Event) -> StopEvent:
+        """What happens to a one-sided row, by name."""
+        scales, (name, side) = self.model.scales, self.one_sided.parts[event.row]
+        turns = side != "taut" and self.model.scene.springs[name].type == "rotational"
+        impulse = event.impulse * (scales.moment if turns else scales.force) * self.time
+        where = self.one_sided.names[event.row]
+        return StopEvent(event.t * self.time, where, side, event.acts, impulse, event.lost * scales.moment, turns)
 
     def instant(self, sample: Sample) -> MotionState:
         """The state by name of a dimensionless sample; multipliers balance all forces in least squares."""
@@ -162,6 +171,8 @@ class MotionState(Configuration):
         """``kinetic`` and ``elastic`` energy, potential of the present ``loads``, and their sum ``total``, N m.
 
         ``loads`` is minus the present forces times displacements, so that the sum also changes while loads change.
+        Where laws have memory, tendons may be slack or springs have stops also what is ``dissipated``, in impacts and
+        otherwise, which the total does not have.
         """
         kinetic, elastic, loads = (part * self.model.scales.moment for part in self.energies)
         lost, spent = dict[str, float](), self.fields.dissipated
@@ -193,6 +204,44 @@ class MotionState(Configuration):
         return {**tables, "energy": self.energy, "momentum": self.momentum}
 
 
+@dataclass(frozen=True)
+class StopEvent:
+    """When a tendon becomes taut or slack, or a stop of a spring is reached or left.
+
+    Attributes
+    ----------
+    time : float
+        s.
+    name : str
+        ``tendons.NAME`` or ``springs.NAME``.
+    side : str
+        ``taut`` of a tendon; ``low`` or ``high`` of a stop.
+    acts : bool
+        Whether the tendon is taut, or the spring at its stop, from then on.
+    impulse : float
+        Of the tension or the stop, not below zero, N s; N m s of a stop of an angle; zero where nothing hits.
+    dissipated : float
+        The energy that all impulses of that time dissipate, J, at the first of them; else zero.
+    turns : bool
+        Whether it is a stop of an angle.
+    """
+
+    time: float
+    name: str
+    side: str
+    acts: bool
+    impulse: float
+    dissipated: float
+    turns: bool = False
+
+    def __str__(self) -> str:
+        when, unit = f"at {self.time:.9g} s {self.name}", "N m s" if self.turns else "N s"
+        what = f"{'' if self.acts else 'not '}{self.side if self.side == 'taut' else f'at its {self.side} stop'}"
+        hit = f", after an impulse of {number_in_words(self.impulse, unit)}" if self.impulse else ""
+        lost = f" that dissipates {number_in_words(self.dissipated, 'N m')}" if self.dissipated else ""
+        return f"{when}: {what}{hit}{lost}"
+
+
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """The answer of a dynamic analysis: the motion of a scene in time.
@@ -222,6 +271,8 @@ class Trajectory:
         Why the motion ended early; empty where it did not.
     record : StepRecord or None
         The time steps of the integrator, which :meth:`between` and :meth:`resampled` interpolate; None of ``idas``.
+    events : tuple of StopEvent
+        When tendons became taut or slack, and stops of springs were reached or left, in the order of time.
     """
 
     scene: Any = field(repr=False)
@@ -236,6 +287,7 @@ class Trajectory:
     notes: tuple[str, ...] = ()
     failure: str = ""
     record: StepRecord | None = field(repr=False, default=None)
+    events: tuple[StopEvent, ...] = field(repr=False, default=())
 
     def __repr__(self) -> str:
         answers = f"{counted(len(self.steps), 'answer')} from {self.steps[0].time:g} to {self.last.time:g} s"
@@ -367,6 +419,7 @@ class Trajectory:
             **({"error_of": self.error_of} if self.error_of else {}),
             "violation": dict(self.violation),
             "notes": list(self.notes),
+            **({"events": [vars(event) for event in self.events]} if self.scene.stopped else {}),
             "times": self.times.tolist(),
             **_columns([step.to_dict() for step in self.steps]),
         }

@@ -37,7 +37,7 @@ from .inertialess import check_balanced, check_resisted
 from .integrating import SHORTEST
 from .integrators import InitialState, Integrator, Stages, TimeGrid
 from .methods import GeneralisedAlpha, Radau
-from .motion import MotionState, Mover, Trajectory
+from .motion import MotionState, Mover, StopEvent, Trajectory
 from .sampling import StepRecord
 from .shaping import shaped
 from .stages import StageEquations
@@ -100,7 +100,7 @@ def simulate(scene: Scene, settings: Settings, progress: Callable[[float], Any] 
 @dataclass
 class MeshRun:
     """The result of one run on one mesh: states, number of steps, largest errors of constraints and norms, notes,
-    times, steps.
+    times, steps, events.
     """
 
     instants: list[MotionState]
@@ -112,6 +112,7 @@ class MeshRun:
     failure: SolveError | None = None
     interrupted: bool = False
     record: StepRecord | None = None
+    events: tuple[StopEvent, ...] = ()
 
 
 class Simulation:
@@ -207,9 +208,12 @@ class Simulation:
         if watch is None or not watch.ended:
             run.instants += [mover.instant(sample) for sample in integrator.rest()]
         if watch is not None:
-            run.instants = watch.up_to_end(run.instants, self.times)
+            record = integrator.record if len(one_sided) else None
+            run.instants = watch.up_to_end(run.instants, self.times, None if record is None else record.sample)
             run.notes = (*run.notes, watch.note(run.instants))
         run.count, run.gap, run.norm, run.record = integrator.count, integrator.gap, integrator.norm, integrator.record
+        ended = run.instants[-1].time if run.instants else 0.0
+        run.events = tuple(event for event in map(mover.event, integrator.events) if event.time <= ended)
         self.seconds["solve"] += time.perf_counter() - solving
         return run
 
@@ -387,6 +391,7 @@ class Simulation:
             notes=(*run.notes, *self._unlikely(run), *self._superelement_notes(run), *self._law_notes(run)),
             failure="" if run.failure is None else run.failure.detail,
             record=run.record,
+            events=run.events,
         )
         if run.failure is not None:
             if motion.steps:
@@ -421,7 +426,7 @@ class Simulation:
         if run.gap > DRIFTED:
             return (f"joints are off by {run.gap:.0e}: {short}",)
         kinetic, elastic, loads = np.array([instant.energies for instant in run.instants]).T
-        total = kinetic + elastic + loads
+        total = kinetic + elastic + loads + np.array([instant.sample.lost for instant in run.instants])
         most = float(kinetic.max() + np.ptp(elastic) + np.ptp(loads))
         changed = float(np.abs(total - total[0]).max())
         if _keeps_energy(run.instants[0].model) and changed > LOST * most > 0.0:
