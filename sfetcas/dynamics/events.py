@@ -25,6 +25,8 @@ Applications, CISM 302 (1988); Pfeiffer and Glocker, Multibody Dynamics with Uni
 from __future__ import annotations
 
 import functools
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -56,7 +58,7 @@ class Event:
     impulse : float
         Along the row.
     lost : float
-        The energy that all impulses of that time take away, at the first of them; else zero.
+        The energy that all impulses of that time take away, at the largest of them; else zero.
     """
 
     t: float
@@ -259,39 +261,48 @@ class Events:
         acting, lam = self._settled(there, touching & ~ceases, touching, h)
         there = replace(there, acting=acting.astype(float), lam=lam)
         self._offset = np.where(acting, 0.0, np.maximum(-self._opened(there.q, there.y, there.t, there), 0.0))
+        hardest = int(np.argmax(impulses))
         for i in np.flatnonzero((acting != before) | (impulses > 0.0)).tolist():
-            self.found.append(Event(memory.t, i, bool(acting[i]), float(impulses[i]), lost))
-            lost = 0.0
+            own = lost if i == hardest else 0.0
+            self.found.append(Event(memory.t, i, bool(acting[i]), float(impulses[i]), own))
         return there
 
     def _settled(self, memory: Memory, acting: Array, touching: Array, h: float) -> tuple[Array, Array]:
         """Which of the rows that touch act from now on, (rows,) of bool, and all multipliers."""
         if not touching.any():
             return acting, np.zeros(len(memory.lam))
-        tried: set[bytes] = set()
         h = self._length(h)
         while h > SHORTEST:
-            if acting.tobytes() in tried:
-                # Waves that are shorter than this make what is true at once untrue a little later.
-                tried.clear()
-                h *= SHORTER
-            tried.add(acting.tobytes())
-            forces, opened, rounding = self._forces(replace(memory, acting=acting.astype(float)), h)
-            forces = np.where(acting, forces, np.inf)
-            worst = int(np.argmin(forces))
-            if forces[worst] < -rounding:
-                acting = acting & (np.arange(len(acting)) != worst)
-                continue
-            closed = np.where(touching & ~acting, opened, np.inf)
-            worst = int(np.argmin(closed))
-            if closed[worst] >= -ROUNDING:
-                lam = np.zeros(len(memory.lam))
-                lam[self.rows] = self.signs * np.where(acting, forces, 0.0)
-                return acting, lam
-            acting = acting | (np.arange(len(acting)) == worst)
+            tried: set[bytes] = set()
+            now = acting
+            while now.tobytes() not in tried:
+                tried.add(now.tobytes())
+                found, lam = self._tried(memory, now, touching, h)
+                if lam is not None:
+                    return now, lam
+                now = found
+            # What goes from one choice to the next may go round: where there are few all are tried.
+            for choice in _choices(touching):
+                if choice.tobytes() not in tried and (lam := self._tried(memory, choice, touching, h)[1]) is not None:
+                    return choice, lam
+            # Waves that are shorter than the step make what is true at once untrue a little later.
+            h *= SHORTER
         seconds = memory.t * self.stepper.time
         names = ", ".join(np.array(self.system.one_sided.names)[touching].tolist())
         raise SolveError(Status.STOPPED, f"at {seconds:.9g} s no choice of what acts holds, of {names}", memory)
+
+    def _tried(self, memory: Memory, acting: Array, touching: Array, h: float) -> tuple[Array, Array | None]:
+        """Multipliers where a choice of rows that act holds, else None, and the next choice that may."""
+        forces, opened, rounding = self._forces(replace(memory, acting=acting.astype(float)), h)
+        forces, opened = np.where(acting, forces, np.inf), np.where(touching & ~acting, opened, np.inf)
+        pulled, passed = int(np.argmin(forces)), int(np.argmin(opened))
+        if forces[pulled] < -rounding:
+            return acting & (np.arange(len(acting)) != pulled), None
+        if opened[passed] < -ROUNDING:
+            return acting | (np.arange(len(acting)) == passed), None
+        lam = np.zeros(len(memory.lam))
+        lam[self.rows] = self.signs * np.where(acting, forces, 0.0)
+        return acting, lam
 
     def _consistent(self, memory: Memory) -> Memory:
         """The state with the nearest velocities that all acting rows allow."""
@@ -396,7 +407,7 @@ class _Collision:
             w = w - back @ found
             left = speed - chosen @ back @ found
             impulses[taking] = found
-            touching[taking] = (found > 0.0) | (left > -SLOW * np.abs(speed).max())
+            touching[taking] = (found > 0.0) | (left > -SLOW * max(1.0, float(np.abs(speed).max())))
             lost = 0.5 * float(found @ chosen @ back @ found)
         _, _, velocity, _ = self._system.rates_at(self._state, self._factors, w * self._unit, self._faster)
         return velocity, impulses, touching, lost
@@ -427,12 +438,23 @@ def _complementary(yielding: Array, speed: Array) -> Array:
     return np.asarray(nnls(root[:, None] * vectors.T, (vectors.T @ speed) / root)[0])
 
 
+def _choices(touching: Array) -> Iterator[Array]:
+    """All choices of rows that touch, those of most rows first; none where there are too many rows."""
+    rows = np.flatnonzero(touching)
+    for count in range(len(rows), -1, -1) if len(rows) <= FEW else ():
+        for chosen in itertools.combinations(rows.tolist(), count):
+            yield np.isin(np.arange(len(touching)), chosen)
+
+
 def _with_velocity(rates: Array, velocity: Array) -> Array:
     return np.vstack([velocity[None, :], rates[1:]])
 
 
 MOST, BRIEF = 200, 1e-3
 """Events that are too many within this share of the motion."""
+
+FEW = 5
+"""Rows that touch at one time of which all choices are tried."""
 
 REPEATED, EBBED = 4, 1e-8
 """Impacts, each weaker and sooner than the one before, and the way between them, unit of length or rad, at which they are
@@ -452,7 +474,7 @@ TOGETHER = 1e-9
 """Opening, unit of length or rad, up to which a row closes at the same time as another one."""
 
 SLOW = 1e-9
-"""Speed of opening, over the largest closing speed, up to which a row stays closed in an impact."""
+"""Speed of opening, over the largest closing speed or dimensionless, up to which a row stays closed in an impact."""
 
 XTOL, RELEASED = 1e-13, 1e-7
 """Shares of a step to which an impact is located, and a release: the force being near zero, that errs by their cube."""

@@ -221,7 +221,7 @@ class StopEvent:
     impulse : float
         Of the tension or the stop, not below zero, N s; N m s of a stop of an angle; zero where nothing hits.
     dissipated : float
-        The energy that all impulses of that time dissipate, J, at the first of them; else zero.
+        The energy that all impulses of that time dissipate, J, at the largest of them; else zero.
     turns : bool
         Whether it is a stop of an angle.
     """
@@ -238,7 +238,7 @@ class StopEvent:
         when, unit = f"at {self.time:.9g} s {self.name}", "N m s" if self.turns else "N s"
         what = f"{'' if self.acts else 'not '}{self.side if self.side == 'taut' else f'at its {self.side} stop'}"
         hit = f", after an impulse of {number_in_words(self.impulse, unit)}" if self.impulse else ""
-        lost = f" that dissipates {number_in_words(self.dissipated, 'N m')}" if self.dissipated else ""
+        lost = f", {number_in_words(self.dissipated, 'N m')} dissipated" if self.dissipated else ""
         return f"{when}: {what}{hit}{lost}"
 
 
