@@ -201,7 +201,7 @@ def check_driving(
                 _check_constant(name, analysis, "tendons")
             continue
         try:
-            _check_start(name, histories[tendon.history], analysis, resting)
+            _check_start(name, histories[tendon.history], analysis, resting, may_begin=tendon.may_be_slack)
             _check_course(name, histories[tendon.history], analysis.duration)
         except SceneError as error:
             raise error.within("histories", tendon.history) from None
@@ -216,10 +216,13 @@ def _check_constant(motion: str, analysis: Analysis, table: str = "motions") -> 
         raise SceneError(message, (table, motion))
 
 
-def _check_start(motion: str, history: History, analysis: Analysis, resting: bool) -> None:
+def _check_start(
+    motion: str, history: History, analysis: Analysis, resting: bool, *, may_begin: bool = False
+) -> None:
+    """Refuse a history that begins with a jump; ``may_begin``: with any number, which a slack tendon may."""
     factor, rate = history.factor(0.0), history.rate(0.0)
     least, slowest = history.rounding
-    if abs(factor) > least and analysis.initial == "undeformed":
+    if abs(factor) > least and analysis.initial == "undeformed" and not may_begin:
         accepted = "a history that begins with 0, or initial = 'equilibrium'"
         raise SceneError(
             f"begins with {factor:g}, so that the motion {motion!r} would jump at t = 0, accepted: {accepted}"

@@ -4,13 +4,7 @@ Each one-sided row has an opening, which is not below zero, and a force, which i
 Between events the motion is that of a system in which the rows that act are constraints, and the others are absent.
 
 - The force of a row falls through zero: it ceases to act.  Velocities do not change.
-- The opening of a row falls through zero: an impact.  Velocities ``w`` of the unknowns change by impulses ``p`` along
-  the rows ``H`` that act or close, so that none closes further,
-
-      M (w+ - w) = H^T p,      p >= 0,      H w+ >= 0,      p . H w+ = 0,
-
-  without rebound.  It is the velocity nearest to ``w`` in the metric of the masses ``M`` that all rows allow (Gauss's
-  principle of least constraint), and what is lost is ``1/2 (w - w+).M (w - w+)``, never below zero.
+- The opening of a row falls through zero: an impact, see :mod:`~sfetcas.dynamics.impacts`.
 
 After either of them the rows that stay closed are those whose forces are not below zero at once.
 
@@ -18,30 +12,30 @@ Times are those at which a step from the begin of the present one ends at zero, 
 are.  Forces are multipliers of rows, whose order in the length of the step is less than that of positions; where they
 decide they are those of a short step from there, from velocities that the rows allow.
 
-Source: Moreau, Unilateral contact and dry friction in finite freedom dynamics, in: Nonsmooth Mechanics and
-Applications, CISM 302 (1988); Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts (1996).
+Where impacts come ever closer, as between two rows at an acute angle, the rows stay closed once the way between two of
+them is next to nothing.
+
+Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts (1996).
 """
 
 from __future__ import annotations
 
-import functools
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import casadi as ca
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
-from scipy.optimize import brentq, nnls
+from scipy.optimize import brentq
 
 from ..errors import SolveError, Status
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import Array
 from ..mathematics.interpolation import evaluation
 from ..mechanics.equations import State
+from .impacts import Impacts
 from .integrating import SHORTEST, Memory, Passed, Stepper, Taken
 from .sampling import turned_by
 
-__all__ = ["Event", "Events"]
+__all__ = ["TOGETHER", "Event", "Events"]
 
 
 @dataclass(frozen=True)
@@ -86,7 +80,7 @@ class Events:
     def __init__(self, stepper: Stepper, span: float) -> None:
         self.stepper, self.system, self._span = stepper, stepper.system, span
         self.rows, self.signs = self.system.one_sided.rows, self.system.one_sided.signs
-        self.found: list[Event] = []
+        self._impacts, self.found = Impacts(self.system), list[Event]()
         self._offset = np.zeros(len(self.rows))
         # Times of events, and the times and speeds of impacts.
         self._times: list[float] = []
@@ -192,7 +186,7 @@ class Events:
             if k < len(shares) - 1 and missing[k] < missing[k - 1] and missing[k] <= missing[k + 1]:
                 # Between three of them the parabola through them says where it is least.
                 a, b = missing[k - 1] - missing[k], missing[k + 1] - missing[k]
-                at = float(shares[k] + 0.5 * (a - b) / max(a + b, TINY) * (shares[k + 1] - shares[k]))
+                at = float(shares[k] + 0.5 * (a - b) / max(a + b, 1e-300) * (shares[k + 1] - shares[k]))
                 lowest = self._interpolated(taken, at)[idle] + self._offset[idle] + ROUNDING
                 if lowest.min() < 0.0:
                     return [shares[k - 1], at] if k > 1 else [at]
@@ -252,7 +246,7 @@ class Events:
     def _after(self, memory: Memory, closes: Array, ceases: Array, h: float) -> Memory:
         """The state after an event at which rows close or cease to act, both (rows,) of bool."""
         before = memory.acting > 0.0
-        collision = _Collision(self, memory)
+        collision = self._impacts.at(memory)
         speed = collision.speed(before, closes)
         if speed > 0.0 and self._ebbs(memory.t, speed):
             before, closes = before | closes, np.zeros(len(before), bool)
@@ -307,7 +301,7 @@ class Events:
     def _consistent(self, memory: Memory) -> Memory:
         """The state with the nearest velocities that all acting rows allow."""
         acting = memory.acting > 0.0
-        velocity, *_ = _Collision(self, memory).solved(acting, np.zeros(len(acting), bool))
+        velocity, *_ = self._impacts.at(memory).solved(acting, np.zeros(len(acting), bool))
         return replace(memory, rates=_with_velocity(memory.rates, velocity), last=None)
 
     @staticmethod
@@ -334,109 +328,6 @@ class Events:
         """The openings (rows,) at a state; angles that count turns are those near a state."""
         return self.system.openings(State(q, y, near.lam, near.unwrapped), t)
 
-    @functools.cached_property
-    def momenta(self) -> ca.Function:
-        """(q, y, factors, unwrapped, v) -> Jacobian of the rows, masses of the unknowns, and momenta of velocities v
-        of the quantities, by the unknowns.
-        """
-        system, n = self.system, self.system.layout
-        q, y, v = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("v", n.x)
-        factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
-        nothing = ca.MX.zeros(n.lam)
-        still, forces = ca.MX.zeros(n.x, 1), system.forces(ca.MX.zeros(n.x, 1), v)
-        moving, resting = (system.stage(q, y, nothing, part, factors, unwrapped) for part in (forces, still))
-        unknowns = system.equations.unknowns
-        rows = system.static_matrix(resting)[unknowns:, :unknowns]
-        mass = system.coupling_matrix(resting, 0.0, 1.0)[:unknowns, :unknowns]
-        found = [rows, mass, (moving.residual - resting.residual)[:unknowns]]
-        return ca.Function("momenta", [q, y, factors, unwrapped, v], found)
-
-
-class _Collision:
-    """Masses and rows at a state, and the velocities after impulses along the rows."""
-
-    def __init__(self, events: Events, memory: Memory) -> None:
-        system, seconds = events.system, memory.t * events.stepper.time
-        self._system, self._rows, self._signs = system, events.rows, events.signs
-        self._state = State(memory.q, memory.y, memory.lam, memory.unwrapped)
-        self._factors = system.factors(memory.t)
-        rates = [0.0 if history is None else history.rate(seconds) for history in system.histories]
-        self._faster = np.array(rates) * events.stepper.time
-        still = np.zeros(system.equations.unknowns)
-        _, _, drift, self._opening = system.rates_at(self._state, self._factors, still, self._faster)
-        given = self._state.q.T, memory.y, self._factors, system.counted(self._state)
-        rows, mass, momentum = (np.array(part) for part in events.momenta(*given, memory.rates[0] - drift))
-        # In units in which each unknown has the mass one, but where it has next to none.
-        diagonal = np.abs(np.diag(mass))
-        self._unit = 1.0 / np.sqrt(np.maximum(diagonal, LIGHT * diagonal.max(initial=TINY)))
-        self._jacobian, self._momentum = rows * self._unit, momentum.ravel() * self._unit
-        self._mass = mass * self._unit * self._unit[:, None] + MASSLESS * np.eye(len(mass))
-
-    @functools.cached_property
-    def _always(self) -> Index:
-        """The rows that are on no side."""
-        return np.setdiff1d(np.arange(len(self._jacobian)), self._rows)
-
-    def _allowed(self, before: Array) -> Array:
-        """The nearest velocities (unknowns,) under which no row opens or closes that acts."""
-        held = np.concatenate([self._always, self._rows[before]])
-        return self._onto(held, self._momentum[:, None], -self._opening[held])[:, 0]
-
-    def speed(self, before: Array, closes: Array) -> float:
-        """The largest speed with which a row closes; arguments as of :meth:`solved`."""
-        if not closes.any():
-            return 0.0
-        rows = self._rows[closes]
-        return float((self._signs[closes] * (self._jacobian[rows] @ self._allowed(before) + self._opening[rows])).max())
-
-    def solved(self, before: Array, closes: Array) -> tuple[Array, Array, Array, float]:
-        """Velocities (quantities,) after the event, impulses, which rows touch then, and the energy that is lost.
-
-        ``before`` and ``closes`` are the rows that act and those that close, (rows,) of bool.
-        """
-        always = self._always
-        w = self._allowed(before)
-        impulses, taking, lost = np.zeros(len(before)), np.flatnonzero(before | closes), 0.0
-        touching = before.copy()
-        if closes.any():
-            chosen = self._signs[taking, None] * self._jacobian[self._rows[taking]]
-            speed = chosen @ w + self._signs[taking] * self._opening[self._rows[taking]]
-            speed[before[taking]] = 0.0
-            back = self._onto(always, chosen.T, np.zeros(len(always)))
-            found = _complementary(chosen @ back, speed)
-            w = w - back @ found
-            left = speed - chosen @ back @ found
-            impulses[taking] = found
-            touching[taking] = (found > 0.0) | (left > -SLOW * max(1.0, float(np.abs(speed).max())))
-            lost = 0.5 * float(found @ chosen @ back @ found)
-        _, _, velocity, _ = self._system.rates_at(self._state, self._factors, w * self._unit, self._faster)
-        return velocity, impulses, touching, lost
-
-    def _onto(self, rows: Index, momenta: Array, opening: Array) -> Array:
-        """Velocities (unknowns, n) for momenta (unknowns, n) under which rows open at given rates (rows,)."""
-        held = self._jacobian[rows]
-        size = np.maximum(np.linalg.norm(held, axis=1), TINY)
-        held, n = held / size[:, None], len(self._mass)
-        right = np.vstack([momenta, np.repeat((opening / size)[:, None], momenta.shape[1], axis=1)])
-        matrix = np.block([[self._mass, held.T], [held, np.zeros((len(rows),) * 2)]])
-        # Rows that depend on each other leave multipliers open: a small diagonal, which is then taken out again.
-        regular = matrix - np.diag(np.repeat([0.0, DUAL], [n, len(rows)]))
-        factors = lu_factor(regular)
-        found = lu_solve(factors, right)
-        for _ in range(REFINED):
-            found += lu_solve(factors, right - matrix @ found)
-        return np.asarray(found[:n])
-
-
-def _complementary(yielding: Array, speed: Array) -> Array:
-    """The impulses (n,), none below zero, that leave no speed above zero: ``speed - yielding p <= 0``, zero where p > 0.
-
-    ``yielding`` (n, n) is symmetric and has no eigenvalue below zero.
-    """
-    values, vectors = np.linalg.eigh(0.5 * (yielding + yielding.T))
-    root = np.sqrt(np.maximum(values, MASSLESS * values.max(initial=TINY)))
-    return np.asarray(nnls(root[:, None] * vectors.T, (vectors.T @ speed) / root)[0])
-
 
 def _choices(touching: Array) -> Iterator[Array]:
     """All choices of rows that touch, those of most rows first; none where there are too many rows."""
@@ -457,8 +348,8 @@ FEW = 5
 """Rows that touch at one time of which all choices are tried."""
 
 REPEATED, EBBED = 4, 1e-8
-"""Impacts, each weaker and sooner than the one before, and the way between them, unit of length or rad, at which they are
-over.
+"""Impacts, each weaker and sooner than the one before, and the way between them, unit of length or rad, at which
+they are over.
 """
 
 PARTS = 4
@@ -473,24 +364,13 @@ ROUNDING = 1e-12
 TOGETHER = 1e-9
 """Opening, unit of length or rad, up to which a row closes at the same time as another one."""
 
-SLOW = 1e-9
-"""Speed of opening, over the largest closing speed or dimensionless, up to which a row stays closed in an impact."""
-
 XTOL, RELEASED = 1e-13, 1e-7
 """Shares of a step to which an impact is located, and a release: the force being near zero, that errs by their cube."""
 
 SHARE, LEAST, SHORTER = 0.05, 3e-4, 0.2
-"""Share of a step in which forces are found, its least length, dimensionless, for the sake of rounding, and by what it is
-shorter where they tell nothing.
+"""Share of a step in which forces are found, its least length, dimensionless, for the sake of rounding, and by what it
+is shorter where they tell nothing.
 """
 
 ROUNDED, RELATIVE = 10.0, 1e-9
 """Forces that are rounding: rounding of places over the square of the step, and the share of the largest force."""
-
-LIGHT, MASSLESS, TINY = 1e-6, 1e-12, 1e-300
-"""Share of the largest mass below which an unknown keeps it in its unit, and of a unit that counts as no mass; and what
-is divided by instead of zero.
-"""
-
-DUAL, REFINED = 1e-12, 3
-"""Diagonal of the rows, whose gradients are of length one, and rounds in which what it does is taken out again."""

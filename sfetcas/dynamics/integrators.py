@@ -20,6 +20,7 @@ from .stages import StageEquations
 
 __all__ = ["InitialState", "Integrator", "Stages", "TimeGrid"]
 
+
 @dataclass(frozen=True, eq=False)
 class InitialState:
     """The initial state of a motion, dimensionless.

@@ -229,9 +229,7 @@ class Simulation:
             status = Status.OUTSIDE if instant.fields.beyond_tables() else Status.BENT
             raise SolveError(status, f"at {instant.time:.6g} s: {message}")
 
-    def begun(
-        self, system: StageEquations, free: Equations | None = None
-    ) -> tuple[InitialState, tuple[str, ...]]:
+    def begun(self, system: StageEquations, free: Equations | None = None) -> tuple[InitialState, tuple[str, ...]]:
         """Where the motion begins, and what is to be said of it; ``free`` are equations without one-sided rows."""
         model = system.model
         state = at_rest(model)
@@ -276,7 +274,9 @@ class Simulation:
         if opened[worst] < -TOGETHER:
             table, name = rows.names[worst].split(".", 1)
             missing = -opened[worst] * system.model.scales.length
-            message = f"found {missing:.3g} m shorter than its way at t = 0, accepted: as long, or initial = 'equilibrium'"
+            message = (
+                f"found {missing:.3g} m shorter than its way at t = 0, accepted: as long, or initial = 'equilibrium'"
+            )
             raise SceneError(message, (table, name))
         return (opened <= TOGETHER).astype(float)
 

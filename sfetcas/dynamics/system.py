@@ -280,7 +280,7 @@ class System(Expressions):
         return State(state.q, state.y, np.zeros(len(model.row_names)), unwrapped)
 
     def openings(self, state: State, t: float) -> Array:
-        """How far the one-sided rows (rows,) are open at a state and a dimensionless time, below zero where violated."""
+        """How far the one-sided rows (rows,) are open at a state and a dimensionless time; violated below zero."""
         return np.array(self._opening(state.q.T, state.y, self.factors(t), self.counted(state))).ravel()
 
     @functools.cached_property
