@@ -216,9 +216,7 @@ def _check_constant(motion: str, analysis: Analysis, table: str = "motions") -> 
         raise SceneError(message, (table, motion))
 
 
-def _check_start(
-    motion: str, history: History, analysis: Analysis, resting: bool, *, may_begin: bool = False
-) -> None:
+def _check_start(motion: str, history: History, analysis: Analysis, resting: bool, *, may_begin: bool = False) -> None:
     """Refuse a history that begins with a jump; ``may_begin``: with any number, which a slack tendon may."""
     factor, rate = history.factor(0.0), history.rate(0.0)
     least, slowest = history.rounding

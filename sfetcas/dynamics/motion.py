@@ -236,7 +236,9 @@ class StopEvent:
 
     def __str__(self) -> str:
         when, unit = f"at {self.time:.9g} s {self.name}", "N m s" if self.turns else "N s"
-        what = f"{'' if self.acts else 'not '}{self.side if self.side == 'taut' else f'at its {self.side} stop'}"
+        what = f"{'at' if self.acts else 'off'} its {self.side} stop"
+        if self.side == "taut":
+            what = "taut" if self.acts else "slack"
         hit = f", after an impulse of {number_in_words(self.impulse, unit)}" if self.impulse else ""
         lost = f", {number_in_words(self.dissipated, 'N m')} dissipated" if self.dissipated else ""
         return f"{when}: {what}{hit}{lost}"
