@@ -47,7 +47,7 @@ def test_a_string_catches_what_falls(dimension, integrator):
     """A body falls beside its anchor: time and impulse of the impact, what is lost, what stays."""
     one = string(length=1.0)
     table = bob({"t": one}, [0.6, 0.0], {"end": 0.6, "integrator": integrator}, dimension=dimension)
-    table["analysis"]["step"] = 0.02 if integrator == "radau-3" else 1e-3
+    table["analysis"]["step"] = 0.02 if integrator == "radau-3" else 2e-3
     motion = solve(made(table))
     (event,) = motion.events
     time, speed = np.sqrt(2 * 0.8 / G), np.sqrt(2 * 0.8 * G)
@@ -62,7 +62,7 @@ def test_a_string_catches_what_falls(dimension, integrator):
     # Angular momentum about the anchor changes by the moment of the weight only, and the string is not stretched.
     about = [np.cross(step.position("B"), step.velocity("B"))[2] for step in (before, after)]
     # To what velocities between long steps have: a jump would be of the order of one.
-    assert about[1] - about[0] == pytest.approx(-0.6 * G * 2e-4, abs=1e-5)
+    assert about[1] - about[0] == pytest.approx(-0.6 * G * 2e-4, abs=1e-4)
     last = motion.last
     assert last.tendon("t")["length"] == pytest.approx(1.0, abs=1e-9)
     energy = [step.energy for step in motion.steps]
@@ -200,7 +200,7 @@ def test_two_links_caught_by_a_string():
 def _corner(along, **analysis):
     """A body that falls between two strings, between which there is an acute angle where both are taut."""
     strings = {name: string([x, 0.0], length=1.0) for name, x in (("left", -0.6), ("right", 0.6))}
-    return made(bob(strings, [along, -0.2], {"end": 1.0, "step": 0.05, **analysis}))
+    return made(bob(strings, [along, -0.2], {"end": 1.0, **(analysis or {"step": 0.05})}))
 
 
 @pytest.mark.parametrize("along", [0.0, 1e-11, 0.1])
@@ -246,7 +246,7 @@ def _on_spring(**analysis):
         "springs": {
             "k": {"type": "translational", "node": "B", "stiffness": 9.0, "direction": [1, 0], "stop": [-0.2, 0.3]}
         },
-        "analysis": {"type": "dynamic", "end": 2.0, "step": 0.02, **analysis},
+        "analysis": {"type": "dynamic", "end": 2.0, **(analysis or {"step": 0.02})},
     }
     return made(table)
 
@@ -355,15 +355,15 @@ def _beam(**analysis):
         "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0], "mass": 1.0}},
         "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
         "tendons": {"t": {"way": [{"ground": [1, 0.5]}, {"node": "B"}], "pull": -0.05}},
-        "analysis": {"type": "dynamic", "end": 0.5, **analysis},
+        "analysis": {"type": "dynamic", "end": 0.3, **analysis},
     }
     return made(table)
 
 
 def test_a_beam_caught_by_a_string():
     """Two integrators on different meshes agree on the impact and on where the beam is afterwards."""
-    one = solve(_beam(accuracy=1e-3))
-    other = solve(_beam(integrator="generalised-alpha", step=1e-3, accuracy=1e-4))
+    one = solve(_beam(accuracy=3e-3))
+    other = solve(_beam(integrator="generalised-alpha", step=2e-3, accuracy=1e-4))
     assert len(one.events) == len(other.events) == 1
     # On a coarser mesh more of the mass of the beam takes part in the impact, some percent of that at the tip.
     assert one.events[0].impulse == pytest.approx(other.events[0].impulse, rel=3e-2)

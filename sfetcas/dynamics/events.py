@@ -21,11 +21,10 @@ Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts (1996)
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
@@ -174,7 +173,7 @@ class Events:
         low = 0.0
         for high in (*nearest, *shares[shares > nearest[-1]].tolist()):
             if left(high) < 0.0:
-                return float(brentq(left, low, high, xtol=XTOL)) if left(low) > 0.0 else low
+                return _root(left, low, high, XTOL) if left(low) > 0.0 else low
             low = high
         return None
 
@@ -233,7 +232,7 @@ class Events:
 
         for share in doubtful:
             if left(share) < 0.0:
-                return float(brentq(left, 0.0, share, xtol=RELEASED)) if left(0.0) > 0.0 else 0.0
+                return _root(left, 0.0, share, RELEASED) if left(0.0) > 0.0 else 0.0
         return None
 
     def _least(self, memory: Memory, h: float) -> float:
@@ -327,6 +326,13 @@ class Events:
     def _opened(self, q: Array, y: Array, t: float, near: Memory) -> Array:
         """The openings (rows,) at a state; angles that count turns are those near a state."""
         return self.system.openings(State(q, y, near.lam, near.unwrapped), t)
+
+
+def _root(function: Callable[[float], float], low: float, high: float, width: float) -> float:
+    """Where a function changes its sign."""
+    from scipy.optimize import brentq
+
+    return float(brentq(function, low, high, xtol=width))
 
 
 def _choices(touching: Array) -> Iterator[Array]:

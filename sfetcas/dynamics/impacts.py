@@ -20,8 +20,6 @@ import functools
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
-from scipy.optimize import nnls
 
 from ..mathematics.arrays import Array, Index
 from ..mechanics.equations import State
@@ -123,6 +121,8 @@ class Collision:
 
     def _onto(self, rows: Index, momenta: Array, opening: Array) -> Array:
         """Velocities (unknowns, n) for momenta (unknowns, n) under which rows open at given rates (rows,)."""
+        from scipy.linalg import lu_factor, lu_solve
+
         held = self._jacobian[rows]
         size = np.maximum(np.linalg.norm(held, axis=1), TINY)
         held, n = held / size[:, None], len(self._mass)
@@ -142,6 +142,8 @@ def _complementary(yielding: Array, speed: Array) -> Array:
 
     ``yielding`` (n, n) is symmetric and has no eigenvalue below zero.
     """
+    from scipy.optimize import nnls
+
     values, vectors = np.linalg.eigh(0.5 * (yielding + yielding.T))
     root = np.sqrt(np.maximum(values, MASSLESS * values.max(initial=TINY)))
     return np.asarray(nnls(root[:, None] * vectors.T, (vectors.T @ speed) / root)[0])
