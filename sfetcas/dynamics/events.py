@@ -111,7 +111,9 @@ class Events:
         memory = steps[-1].after if steps else taken.begin
         acting = memory.acting > 0.0
         if released is None or share < released:
-            closes = ~acting & (self._openings(memory) <= TOGETHER)
+            opened = np.where(acting, np.inf, self._openings(memory))
+            # The first of them, which may be at the end of a step that is too short, and those that close with it.
+            closes = opened <= max(TOGETHER, float(opened.min()))
             return Passed(steps, self._after(memory, closes, np.zeros(len(acting), bool), taken.h))
         forces = np.where(acting, self._forces(self._consistent(memory), self._length(taken.h))[0], np.inf)
         ceases = np.arange(len(acting)) == np.argmin(forces)
@@ -247,9 +249,9 @@ class Events:
         before = memory.acting > 0.0
         collision = self._impacts.at(memory)
         speed = collision.speed(before, closes)
-        if speed > 0.0 and self._ebbs(memory.t, speed):
-            before, closes = before | closes, np.zeros(len(before), bool)
-        velocity, impulses, touching, lost = collision.solved(before, closes)
+        ebbed = speed > 0.0 and self._ebbs(memory.t, speed)
+        held, hit = (before | closes, closes & False) if ebbed else (before, closes)
+        velocity, impulses, touching, lost = collision.solved(held, hit)
         there = replace(memory, rates=_with_velocity(memory.rates, velocity), last=None, lost=memory.lost + lost)
         acting, lam = self._settled(there, touching & ~ceases, touching, h)
         there = replace(there, acting=acting.astype(float), lam=lam)

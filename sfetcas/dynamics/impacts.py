@@ -69,7 +69,7 @@ class Collision:
         rates = [0.0 if history is None else history.rate(memory.t * unit) for history in system.histories]
         self._faster = np.array(rates) * unit
         still = np.zeros(system.equations.unknowns)
-        _, _, drift, self._opening = system.rates_at(self._state, self._factors, still, self._faster)
+        _, drift, _, self._opening = system.rates_in_time(self._state, self._factors, still, self._faster)
         given = self._state.q.T, memory.y, self._factors, system.counted(self._state)
         rows, mass, momentum = (np.array(part) for part in impacts.momenta(*given, memory.rates[0] - drift))
         # In units in which each unknown has the mass one, but where it has next to none.
@@ -116,7 +116,7 @@ class Collision:
             impulses[taking] = found
             touching[taking] = (found > 0.0) | (left > -SLOW * max(1.0, float(np.abs(speed).max())))
             lost = 0.5 * float(found @ chosen @ back @ found)
-        _, _, velocity, _ = self._system.rates_at(self._state, self._factors, w * self._unit, self._faster)
+        _, velocity, _, _ = self._system.rates_in_time(self._state, self._factors, w * self._unit, self._faster)
         return velocity, impulses, touching, lost
 
     def _onto(self, rows: Index, momenta: Array, opening: Array) -> Array:

@@ -318,10 +318,18 @@ def integrate(
         if last is None or memory.t + last.h > beyond:
             break
         taken = stepper.step(memory, last.h)
-        if not taken.converged or (events is not None and events.within(taken) is not None):
+        if not taken.converged or (events is not None and _happens(events, taken)):
             break
         memory = taken.after
         yield taken
+
+
+def _happens(events: Watching, taken: Taken) -> bool:
+    """Whether anything happens in a step beyond the end, of which no more is asked."""
+    try:
+        return events.within(taken) is not None
+    except SolveError:
+        return True
 
 
 BEYOND = 3

@@ -177,11 +177,11 @@ class System(Expressions):
         """For each one-sided row whether it acts, 1 or 0."""
         return unwrapped[self.layout.unwrapped - len(self.one_sided) :]
 
-    @functools.cached_property
-    def _rates(self) -> ca.Function:
-        """(q, y, factors, unwrapped, step, rates of the factors) -> quantities, then gaps of all rows, and both rates.
+    def _along(self, *, timed: bool) -> ca.Function:
+        """(q, y, factors, unwrapped, step, faster) -> quantities and their derivative along a step of the unknowns.
 
-        The rates are those along a step of the unknowns.
+        Where it is ``timed`` rates of the factors, ``faster``, have a share in the derivative, and gaps of all rows and
+        their derivative follow.
         """
         n = self.layout
         q, y = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y)
@@ -193,26 +193,44 @@ class System(Expressions):
         along, faster = ca.MX.sym("along"), ca.MX.sym("faster", n.factors)
         spin = self.spins(along * step)
         shift = along * step[self.equations.rotation_unknowns : self.equations.unknowns]
-        given = self.given(factors + along * faster)
-        turned = self.with_prescribed_rotations(moved_by(self, q, spin), given)
-        seen = [self.moving(turned, y + shift, given, unwrapped), self.gaps(turned, y + shift, given, unwrapped)]
-        both = [*seen, *(ca.jtimes(part, along, ca.MX(1)) for part in seen)]
-        return ca.Function("rates", [q, y, factors, unwrapped, step, faster], ca.substitute(both, [along], [ca.MX(0)]))
+        given, turned = self.given(factors + along * faster if timed else factors), moved_by(self, q, spin)
+        turned = self.with_prescribed_rotations(turned, given) if timed else turned
+        seen = [self.moving(turned, y + shift, given, unwrapped)]
+        if timed:
+            seen.append(self.gaps(turned, y + shift, given, unwrapped))
+        both = [part for x in seen for part in (x, ca.jtimes(x, along, ca.MX(1)))]
+        arguments = [q, y, factors, unwrapped, step, faster]
+        return ca.Function("rates", arguments, ca.substitute(both, [along], [ca.MX(0)]))
+
+    @functools.cached_property
+    def _rates(self) -> ca.Function:
+        """As of :meth:`_along` at factors that do not change."""
+        return self._along(timed=False)
+
+    @functools.cached_property
+    def _rates_in_time(self) -> ca.Function:
+        """As of :meth:`_along` at factors that change."""
+        return self._along(timed=True)
 
     def rates(self, state: State, factors: Array, step: Array) -> tuple[Array, Array]:
         """Quantities (quantities,) at a state, and their rates for the rates ``step`` (unknowns,) of the unknowns."""
-        x, _, v, _ = self.rates_at(state, factors, step, np.zeros(self.layout.factors))
+        x, v = self._rated(self.interpreted._rates, state, factors, step, np.zeros(self.layout.factors))
         return x, v
 
-    def rates_at(self, state: State, factors: Array, step: Array, faster: Array) -> tuple[Array, Array, Array, Array]:
-        """Quantities (quantities,) and gaps of all rows (rows,) at a state, and their rates.
+    def rates_in_time(
+        self, state: State, factors: Array, step: Array, faster: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Quantities (quantities,) at a state with their rates, and gaps of all rows (rows,) with theirs.
 
         ``step`` (unknowns,) are rates of the unknowns, ``faster`` those of the factors.
         """
+        x, v, gaps, opening = self._rated(self.interpreted._rates_in_time, state, factors, step, faster)
+        return x, v, gaps, opening
+
+    def _rated(self, function: ca.Function, state: State, factors: Array, step: Array, faster: Array) -> list[Array]:
         full = np.concatenate([step, np.zeros(self.equations.rows)])
-        found = self.interpreted._rates(state.q.T, state.y, factors, self.counted(state), full, faster)
-        x, gaps, v, opening = (np.array(part).ravel() for part in found)
-        return x, gaps, v, opening
+        found = function(state.q.T, state.y, factors, self.counted(state), full, faster)
+        return [np.array(part).ravel() for part in found]
 
     @functools.cached_property
     def floating(self) -> tuple[Array, Array] | None:
