@@ -90,6 +90,7 @@ if TYPE_CHECKING:
     from .design.quasi_static import QuasiStaticAnswer as QuasiStaticAnswer
     from .dynamics.modes import Modes as Modes
     from .dynamics.motion import MotionState as MotionState
+    from .dynamics.motion import StopEvent as StopEvent
     from .dynamics.motion import Trajectory as Trajectory
     from .equilibria.solution import Certificate as Certificate
     from .equilibria.solution import Equilibrium as Equilibrium
@@ -173,7 +174,7 @@ _PUBLIC = {
     "design.designing": "Design DesignAnswer find",
     "design.quasi_static": "QuasiStatic QuasiStaticAnswer",
     "dynamics.modes": "Modes",
-    "dynamics.motion": "MotionState Trajectory",
+    "dynamics.motion": "MotionState StopEvent Trajectory",
     "equilibria.solution": "Certificate Equilibrium Solution",
     "equilibria.statics": "Settings solve_model",
     "errors": "SceneError SolveError Status",

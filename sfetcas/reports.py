@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["print_checks", "report", "report_sweep"]
 
-MOST_NODES = 20
+MOST_NODES, MOST_EVENTS = 20, 10
 """Nodes in the printed report at most."""
 
 ROUNDING = 1e-13
@@ -85,6 +85,10 @@ def _report_motion(motion: Trajectory) -> None:
         _report_instant(instant)
     if len(ends) > 1:
         _report_course(motion)
+    for event in motion.events[:MOST_EVENTS]:
+        print(f"  {event}")
+    if len(motion.events) > MOST_EVENTS:
+        print(f"  ... and {counted(len(motion.events) - MOST_EVENTS, 'more event')}, see --json")
     worst = ", ".join(f"{kind} {value:.1e}" for kind, value in motion.violation.items())
     print(f"  worst violation: {worst}; {error_in_words(motion.error_estimate, motion.error_of)}")
     for note in motion.notes:

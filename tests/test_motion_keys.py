@@ -289,18 +289,22 @@ STOPPED = {"springs/k": {"node": "A", "stiffness": 1.0, "stop": [-1, 1]}}
 
 
 @pytest.mark.parametrize("kind", ["modes", "dynamic"])
-def test_obstacles_and_stops_are_refused(kind):
+def test_obstacles_are_refused(kind):
     refused(
         {**of_type(kind), **FLOOR},
         f"contacts.floor: found an obstacle with analysis.type = {kind!r}, accepted: with 'static', "
         "or 'path' without modes",
     )
-    refused(
-        {**of_type(kind), **STOPPED},
-        f"springs.k.stop: found a stop with analysis.type = {kind!r}, accepted: with 'static'",
-    )
     assert made({**of_type("static"), **FLOOR, **STOPPED})
     assert made({**of_type(kind), "springs/k": {"node": "A", "stiffness": 1.0}})
+
+
+def test_stops_are_refused_in_modes():
+    refused(
+        {**of_type("modes"), **STOPPED},
+        "springs.k.stop: found a stop with analysis.type = 'modes', accepted: with 'static' or 'dynamic'",
+    )
+    assert made({**of_type("dynamic"), **STOPPED})
 
 
 def test_structures_may_float_where_no_equilibrium_is_asked_for():

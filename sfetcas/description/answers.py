@@ -176,7 +176,7 @@ contacts.NAME.at | | | statics | fraction of the length, or [from, to]; null whe
 contacts.NAME.gap | m | | statics | smallest distance
 contacts.NAME.member | | | statics | which it touches; all four are lists where it touches more than once
 energy.elastic | J | | all | of members, springs, tendons and tubes
-energy.dissipated | J | | statics, motion | of members whose laws have memory, since they were undeformed
+energy.dissipated | J | | statics, motion | by laws with memory, since undeformed; in motion also by impacts
 energy.loads | J | | statics, motion, parameters | from the undeformed scene
 energy.total | J | | statics, motion, parameters | sum of all that there are
 energy.potential | J | | statics, parameters | another name of the total of an equilibrium

@@ -15,7 +15,14 @@ from .structure import Member, Node
 from .task import Analysis
 from .tendons import Tendon
 
-__all__ = ["check_beginning", "check_driving", "check_masses", "check_no_contact", "check_velocities"]
+__all__ = [
+    "check_beginning",
+    "check_driving",
+    "check_masses",
+    "check_no_contact",
+    "check_one_sided",
+    "check_velocities",
+]
 
 
 def check_masses(
@@ -36,7 +43,7 @@ def check_masses(
 
 
 def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], springs: Mapping[str, Spring]) -> None:
-    """Refuse contacts and stops, which vibrations and motions cannot treat.
+    """Refuse contacts, which vibrations and motions cannot treat, and stops, which vibrations cannot.
 
     Raises
     ------
@@ -48,9 +55,30 @@ def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], spring
         message = f"found an obstacle with {given}, accepted: with 'static', or 'path' without modes"
         raise SceneError(message, ("contacts", name))
     for name, spring in springs.items():
-        if spring.stop is not None:
-            message = f"found a stop with {given}, accepted: with 'static'"
+        if spring.stop is not None and analysis.type != "dynamic":
+            message = f"found a stop with {given}, accepted: with 'static' or 'dynamic'"
             raise SceneError(message, ("springs", name, "stop"))
+
+
+def check_one_sided(analysis: Analysis, springs: Mapping[str, Spring], tendons: Mapping[str, Tendon]) -> None:
+    """Refuse stops and slack tendons with integrators that do not find when they act.
+
+    Raises
+    ------
+    SceneError
+        Names the first of them.
+    """
+    if analysis.integrator not in ("idas", "conserving"):
+        return
+    found = f"found with the integrator {analysis.integrator!r}, which does not find when"
+    accepted = "accepted: radau-3, radau-2, generalised-alpha"
+    for name, spring in springs.items():
+        if spring.stop is not None:
+            raise SceneError(f"{found} it acts, {accepted}", ("springs", name, "stop"))
+    for name, tendon in tendons.items():
+        if tendon.may_be_slack:
+            message = f"{found} a tendon is slack, {accepted}, or pushes = true, or a stiffness"
+            raise SceneError(message, ("tendons", name))
 
 
 def check_velocities(
@@ -168,10 +196,12 @@ def check_driving(
         if not tendon.measured or tendon.stiffness is not None or not (tendon.pull or tendon.length):
             continue
         if tendon.history is None:
-            _check_constant(name, analysis, "tendons")
+            # One that is too short at t = 0 is refused where lengths are known.
+            if not tendon.may_be_slack:
+                _check_constant(name, analysis, "tendons")
             continue
         try:
-            _check_start(name, histories[tendon.history], analysis, resting)
+            _check_start(name, histories[tendon.history], analysis, resting, may_begin=tendon.may_be_slack)
             _check_course(name, histories[tendon.history], analysis.duration)
         except SceneError as error:
             raise error.within("histories", tendon.history) from None
@@ -186,10 +216,11 @@ def _check_constant(motion: str, analysis: Analysis, table: str = "motions") -> 
         raise SceneError(message, (table, motion))
 
 
-def _check_start(motion: str, history: History, analysis: Analysis, resting: bool) -> None:
+def _check_start(motion: str, history: History, analysis: Analysis, resting: bool, *, may_begin: bool = False) -> None:
+    """Refuse a history that begins with a jump; ``may_begin``: with any number, which a slack tendon may."""
     factor, rate = history.factor(0.0), history.rate(0.0)
     least, slowest = history.rounding
-    if abs(factor) > least and analysis.initial == "undeformed":
+    if abs(factor) > least and analysis.initial == "undeformed" and not may_begin:
         accepted = "a history that begins with 0, or initial = 'equilibrium'"
         raise SceneError(
             f"begins with {factor:g}, so that the motion {motion!r} would jump at t = 0, accepted: {accepted}"

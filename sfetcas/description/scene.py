@@ -26,7 +26,14 @@ from .formulas import Formula
 from .inserting import check_insertion, pushed, refuse_insertion
 from .loads import History, Load, Motion
 from .matrices import check_inertia, check_rigid_motion
-from .moving import check_beginning, check_driving, check_masses, check_no_contact, check_velocities
+from .moving import (
+    check_beginning,
+    check_driving,
+    check_masses,
+    check_no_contact,
+    check_one_sided,
+    check_velocities,
+)
 from .obstacles import check_start, members_of, obstacle
 from .records import Named, Record, Vector, brief, counted, number, say, unknown
 from .remembering import check_memory, refuse_memory, remembering_section
@@ -514,7 +521,8 @@ def _check_tendons(scene: Scene) -> None:
             if way.member is not None and not way.holes and scene.members[way.member].branches(scene.sections):
                 found = f"found the member {way.member!r}, whose section relaxes"
                 raise SceneError(f"{found}, accepted: discs, or a member that does not", ("tendons", name))
-        if tendon.may_be_slack and (scene.analysis.type != "static" or scene.analysis.equilibria == "all"):
+        searched = scene.analysis.type in ("static", "dynamic")
+        if tendon.may_be_slack and (not searched or scene.analysis.equilibria == "all"):
             what = "'all' equilibria" if scene.analysis.type == "static" else f"the analysis {scene.analysis.type!r}"
             message = f"found a length that is given with {what}, in which no tendon becomes slack, accepted: pushes ="
             raise SceneError(f"{message} true, with which it is kept as long, or a stiffness", ("tendons", name))
@@ -865,6 +873,7 @@ def _check_moving(scene: Scene) -> None:
     if analysis.moves:
         check_no_contact(analysis, scene.contacts, scene.springs)
     if analysis.type == "dynamic":
+        check_one_sided(analysis, scene.springs, scene.tendons)
         check_driving(analysis, scene.nodes, scene.members, scene.motions, scene.histories, scene.tendons)
 
 

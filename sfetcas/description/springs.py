@@ -64,7 +64,7 @@ class Spring(Record):
         Moment or force against the rate of the angle, travel or length, per unit of that rate.
     stop : (2,), rad, or m with a ``direction``
         ``[low, high]`` about 0: the angle, or the travel along a ``direction``, goes no further.  In statics
-        only.
+        and motions; what moves does not rebound from it.
     """
 
     type: Literal["rotational", "translational"] = "rotational"

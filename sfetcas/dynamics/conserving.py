@@ -91,7 +91,7 @@ class Conserving(Method):
         )
         h, factors = ca.MX.sym("h"), ca.MX.sym("factors", n.factors, 2)
         found = _Middle(system, begin, h, factors, q, y, lam)
-        step = system.solved(found.entries, [2.0 / h**2], found.residual)
+        step = system.solved(found.entries, [2.0 / h**2], found.residual, begin.unwrapped)
         (there,), shift, more, size = system.moved([q], step)
         constants = [begin.q, begin.y, begin.x, begin.rates, begin.unwrapped, h, factors]
         return ca.Function("middle", [q, y, lam, *constants], [there, y + shift, lam + more, size])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -17,7 +19,14 @@ from .methods import Method, Radau
 from .stages import StageEquations
 from .steps import LAST_CHANGE, step_function
 
-__all__ = ["Memory", "Stepper", "Taken", "integrate"]
+__all__ = ["SHORTEST", "Memory", "Passed", "Stepper", "Taken", "Watching", "integrate"]
+
+
+SHORTEST = 5e-7
+"""Shortest step, in the unit of time: rounding of places over its square is a thousandth of what accelerates.
+
+It dies away from step to step then; of a tenth of this step it is much of what accelerates, and grows.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +52,10 @@ class Memory:
         The step before; None after a restart.
     remembered : ndarray
         What members remember, see :class:`~sfetcas.mechanics.memory.Remembering`.
+    acting : ndarray
+        For each one-sided row of the system whether it acts, 1 or 0.
+    lost : float
+        Energy lost in impacts so far.
     """
 
     t: float
@@ -55,6 +68,8 @@ class Memory:
     origin: tuple[Array, Array] = (np.zeros(1), np.zeros(1))
     last: Taken | None = None
     remembered: Array = field(default_factory=lambda: np.zeros(0))
+    acting: Array = field(default_factory=lambda: np.zeros(0))
+    lost: float = 0.0
 
     @property
     def position(self) -> Array:
@@ -109,6 +124,21 @@ class Taken:
         return self.size <= LAST_CHANGE
 
 
+@dataclass(frozen=True, eq=False)
+class Passed:
+    """What has happened within a time step: the steps up to then, perhaps none, and the state after it."""
+
+    steps: list[Taken]
+    after: Memory
+
+
+class Watching(Protocol):
+    """Says what happens within time steps, as :class:`~sfetcas.dynamics.events.Events` does."""
+
+    def within(self, taken: Taken) -> Passed | None:
+        """What happens first in a step that was taken; None where nothing does."""
+
+
 def _arms(group: Observables) -> Array:
     """What the error of quantities counts beside that of positions: the arm on which their share of all mass would be.
 
@@ -144,7 +174,7 @@ class Stepper:
         turns = np.zeros((stages, n.rotations, system.turns)) if last is None else last.turns
         shifts = np.zeros((stages, n.y)) if last is None else last.shifts
         ratio = np.array([0.0 if last is None else h / last.h])
-        counted = np.concatenate([memory.unwrapped, memory.remembered[: system.memory.size]])
+        counted = np.concatenate([memory.unwrapped, memory.remembered[: system.memory.size], memory.acting])
         given = (memory.q, memory.y, memory.lam, turns, shifts, memory.x, memory.rates)
         for i, values in enumerate((*given, ratio, np.array([h]), factors, counted)):
             if values.size:
@@ -160,7 +190,18 @@ class Stepper:
         # All stages of a step know what was remembered at its begin; its end is remembered by the next one.
         remembered = system.memory.after(q, remembered) if system.memory.size else remembered
         kept = rates.reshape(method.kept, n.x)
-        after = Memory(memory.t + h, q, y, lam[-1], x[-1], kept, unwrapped, memory.origin, remembered=remembered)
+        after = replace(
+            memory,
+            t=memory.t + h,
+            q=q,
+            y=y,
+            lam=lam[-1],
+            x=x[-1],
+            rates=kept,
+            unwrapped=unwrapped,
+            last=None,
+            remembered=remembered,
+        )
         change = float(size[0]) if np.isfinite(x).all() else np.inf
         parts = turns.reshape(stages, n.rotations, -1), shifts.reshape(stages, n.y), x, lam
         taken = Taken(memory, after, h, method.places, *parts, change, int(np.nan_to_num(iterations[0])), float(gap[0]))
@@ -197,8 +238,7 @@ class Stepper:
         fresh = replace(memory, last=None)
         if self.method.kept == 1:
             return fresh
-        starter = Stepper(self.system, Radau(2)) if self._starter is None else self._starter
-        self._starter = starter
+        starter = self.starter
         short = starter.step(replace(fresh, rates=memory.rates[:1]), START * h)
         nodes = np.array([0.0, *starter.method.places])
         values = np.vstack([memory.x, short.x])
@@ -209,7 +249,10 @@ class Stepper:
         acceleration = second / short.h**2
         return replace(fresh, rates=np.stack([memory.rates[0], acceleration, acceleration]))
 
-    _starter: Stepper | None = None
+    @functools.cached_property
+    def starter(self) -> Stepper:
+        """What takes a short step from a state without accelerations: the method itself where it keeps none."""
+        return self if self.method.kept == 1 else Stepper(self.system, Radau(2))
 
 
 START = 0.05
@@ -232,6 +275,7 @@ def integrate(
     tolerance: float | None = None,
     first: float | None = None,
     beyond: float = 0.0,
+    events: Watching | None = None,
 ) -> Iterator[Taken]:
     """Integrate up to the last of the breaks; every break is the end of a step.
 
@@ -244,6 +288,7 @@ def integrate(
     tolerance : instead of ``step``: permitted error of a step, over the unit of length
     first : length of the first step that is tried
     beyond : time after the last break up to which loads and motions are smooth
+    events : what ends steps where something happens, after which the integration begins anew
 
     Raises
     ------
@@ -251,38 +296,63 @@ def integrate(
         A step does not converge; the steps before have been given.
     """
     for end in breaks:
-        if end <= memory.t:
-            continue
-        span = end - memory.t
-        if step is not None:
-            count = max(1, int(np.ceil(span / step - 1e-9)))
-            memory = stepper.refreshed(memory, span / count)
-            for k in range(count):
-                taken = stepper.step(memory, (end - memory.t) / (count - k))
-                if not taken.converged:
-                    raise _failed(stepper, taken)
-                memory = taken.after
-                yield taken
-        else:
-            assert tolerance is not None
-            steps = _Adaptive(stepper, tolerance, first)
-            for taken in steps.until(memory, end):
-                memory = taken.after
-                yield taken
-            first = steps.h
+        while end > memory.t:
+            going: _Fixed | _Adaptive
+            if step is not None:
+                going = _Fixed(stepper, step)
+            else:
+                assert tolerance is not None
+                going = _Adaptive(stepper, tolerance, first)
+            passed: Passed | None = None
+            for taken in going.until(memory, end):
+                passed = None if events is None else events.within(taken)
+                yield from [taken] if passed is None else passed.steps
+                memory = taken.after if passed is None else passed.after
+                if passed is not None:
+                    break
+            first = going.h
+            if passed is None or end - memory.t <= tolerances.DECIMAL * end:
+                break
     for _ in range(BEYOND):
         last = memory.last
         if last is None or memory.t + last.h > beyond:
             break
         taken = stepper.step(memory, last.h)
-        if not taken.converged:
+        if not taken.converged or (events is not None and _happens(events, taken)):
             break
         memory = taken.after
         yield taken
 
 
+def _happens(events: Watching, taken: Taken) -> bool:
+    """Whether anything happens in a step beyond the end, of which no more is asked."""
+    try:
+        return events.within(taken) is not None
+    except SolveError:
+        return True
+
+
 BEYOND = 3
 """Steps beyond the end at most."""
+
+
+class _Fixed:
+    """Equal steps up to a break, no longer than a given length."""
+
+    def __init__(self, stepper: Stepper, step: float) -> None:
+        self._stepper, self.h = stepper, step
+
+    def until(self, memory: Memory, end: float) -> Iterator[Taken]:
+        """The steps."""
+        span = end - memory.t
+        count = max(1, int(np.ceil(span / self.h - 1e-9)))
+        memory = self._stepper.refreshed(memory, span / count)
+        for k in range(count):
+            taken = self._stepper.step(memory, (end - memory.t) / (count - k))
+            if not taken.converged:
+                raise _failed(self._stepper, taken)
+            memory = taken.after
+            yield taken
 
 
 class _Adaptive:

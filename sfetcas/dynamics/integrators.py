@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
@@ -12,18 +12,13 @@ import numpy as np
 from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
-from .integrating import Memory, Stepper, Taken, integrate
+from .events import Event, Events
+from .integrating import SHORTEST, Memory, Stepper, Taken, integrate
 from .methods import Method
 from .sampling import Sample, Sampler, StepRecord
 from .stages import StageEquations
 
-__all__ = ["SHORTEST", "InitialState", "Integrator", "Stages", "TimeGrid"]
-
-SHORTEST = 5e-7
-"""Shortest step, in the unit of time: rounding of places over its square is a thousandth of what accelerates.
-
-It dies away from step to step then; of a tenth of this step it is much of what accelerates, and grows.
-"""
+__all__ = ["InitialState", "Integrator", "Stages", "TimeGrid"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +32,15 @@ class InitialState:
         Angular velocities about the fixed axes, rates of the displacement unknowns.
     x, v : ndarray (quantities,)
         Quantities that carry mass or are damped, and their rates.
+    touching : ndarray (rows,)
+        One-sided rows that may act at once: 1 of those that are closed, else 0.
     """
 
     state: State
     rates: Array
     x: Array
     v: Array
+    touching: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +96,8 @@ class Integrator(abc.ABC):
         Largest error so far of the constraints, and of the unit norms of quaternions.
     record : StepRecord or None
         The steps so far; None where there is nothing to interpolate between them with.
+    events : list of Event
+        What one-sided rows have done so far.
     """
 
     record: StepRecord | None = None
@@ -105,6 +105,7 @@ class Integrator(abc.ABC):
     def __init__(self, system: StageEquations, progress: Callable[[float], Any] | None = None) -> None:
         self.system, self._progress = system, progress
         self.count, self.gap, self.norm = 0, 0.0, 0.0
+        self.events: list[Event] = []
 
     @abc.abstractmethod
     def samples(self, begun: InitialState, course: TimeGrid) -> Iterator[Sample]:
@@ -144,16 +145,23 @@ class Stages(Integrator):
         rates = np.zeros((method.kept, len(begun.x)))
         rates[0] = begun.v
         begin = self.system.memory.begun
-        memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.unwrapped, remembered=begin)
+        given = state.q, state.y, state.lam, begun.x, rates, state.unwrapped
+        memory = Memory(0.0, *given, remembered=begin, acting=begun.touching)
         self._sampler, self.record = Sampler(course.times, method.stages), StepRecord(method.stages)
+        first = None if course.step is not None else max(FIRST * course.end, min(course.end, SHORTEST))
+        events = Events(stepper, course.end) if len(self.system.one_sided) else None
+        if events is not None:
+            self.events = events.found
+            memory = events.begun(memory, course.step or first or course.end)
         steps = integrate(
             stepper,
             memory,
             course.breaks,
             step=course.step,
             tolerance=self._tolerance(course),
-            first=None if course.step is not None else max(FIRST * course.end, min(course.end, SHORTEST)),
+            first=first,
             beyond=course.beyond,
+            events=events,
         )
         for taken in steps:
             within = taken.begin.t < course.end * (1.0 - tolerances.DECIMAL)

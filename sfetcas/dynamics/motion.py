@@ -23,7 +23,7 @@ from ..mechanics.balance import three
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
 from ..mechanics.memory import Remembering
-from ..mechanics.model import Model
+from ..mechanics.model import Model, assemble
 from ..solvers.redundancy import loose_rows
 from ..solvers.sharing import shared
 from .projecting import factor_closings
@@ -32,10 +32,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..pictures.animation import Animation
+    from .events import Event
     from .inertia import Inertia
     from .sampling import Sample, StepRecord
 
-__all__ = ["MotionState", "Mover", "Trajectory"]
+__all__ = ["MotionState", "Mover", "StopEvent", "Trajectory"]
 
 
 class Mover:
@@ -47,17 +48,29 @@ class Mover:
     def __init__(self, equations: Equations, inertia: Inertia, time: float, factors: Callable[[float], Array]) -> None:
         self.equations, self.inertia, self.time, self.factors = equations, inertia, time, factors
         self.model: Model = equations.model
-        self.memory = Remembering(self.model)
+        self.memory, self.one_sided = Remembering(self.model), inertia.system.one_sided
+        self._models: dict[bytes, Equations] = {}
         self._redundant: bool | None = None
+
+    def event(self, event: Event) -> StopEvent:
+        """What happens to a one-sided row, by name."""
+        scales, (name, side) = self.model.scales, self.one_sided.parts[event.row]
+        turns = side != "taut" and self.model.scene.springs[name].type == "rotational"
+        impulse = event.impulse * (scales.moment if turns else scales.force) * self.time
+        where = self.one_sided.names[event.row]
+        return StopEvent(event.t * self.time, where, side, event.acts, impulse, event.lost * scales.moment, turns)
 
     def instant(self, sample: Sample) -> MotionState:
         """The state by name of a dimensionless sample; multipliers balance all forces in least squares."""
-        model, equations = self.model, self.equations
+        model, equations, system = self.model, self.equations, self.inertia.system
         if self.memory.size:
             model = self.memory.model_with(sample.remembered)
             equations = equations.remembering(model)
-        loading = self.inertia.system.loading(self.factors(sample.t))
-        free = State(sample.q, sample.y, np.zeros(len(model.row_names)), sample.unwrapped)
+        if len(self.one_sided):
+            equations = self.acting(sample.acting)
+            model = equations.model
+        loading = system.loading_of(model, sample.t) if len(self.one_sided) else system.loading(self.factors(sample.t))
+        free = system.state_of(model, State(sample.q, sample.y, np.zeros(0), sample.unwrapped))
         point = equations.at(free, loading)
         forces = self.inertia.forces(sample.v, sample.a)
         balanced = self.inertia.loading(equations, free, equations.effective(free, loading), forces)
@@ -76,6 +89,16 @@ class Mover:
             mover=self,
         )
 
+    def acting(self, acting: Array) -> Equations:
+        """The equations of the model in which one-sided rows act as told, (rows,), 1 or 0."""
+        found = self._models.get(acting.tobytes())
+        if found is None:
+            model, stops = self.model, self.one_sided.stops(acting)
+            mesh = replace(model.mesh, stops=stops)
+            alone = assemble(model.scene, mesh, assembly=model.assembly, scales=model.scales, like=model)  # type: ignore[arg-type]
+            found = self._models[acting.tobytes()] = Equations(alone, kernels="interpreted")
+        return found
+
     def _balanced(self, equations: Equations, free: State, balanced: Any) -> State:
         """The state with internal forces that leave the least out of balance, and what is open by the rule for it."""
         point, n = equations.at(free, balanced), equations.unknowns
@@ -85,7 +108,7 @@ class Mover:
         factor_closings(equations, point)
         right = np.concatenate([-point.residual[:n], np.zeros(equations.rows)])
         state = replace(free, lam=np.asarray(equations.solver.solve(right)[n:]))
-        if self._redundant is False:
+        if self._redundant is False and not len(self.one_sided):
             return state
         # What is straight where it begins may be bent later, but hardly the other way round.
         loose = loose_rows(equations, point)
@@ -156,9 +179,13 @@ class MotionState(Configuration):
         """``kinetic`` and ``elastic`` energy, potential of the present ``loads``, and their sum ``total``, N m.
 
         ``loads`` is minus the present forces times displacements, so that the sum also changes while loads change.
+        Where laws have memory, tendons may be slack or springs have stops also what is ``dissipated``, in impacts and
+        otherwise, which the total does not have.
         """
         kinetic, elastic, loads = (part * self.model.scales.moment for part in self.energies)
-        lost = {"dissipated": sum(self.fields.dissipated.values())} if self.fields.dissipated else {}
+        lost, spent = dict[str, float](), self.fields.dissipated
+        if spent or self.model.scene.stopped:
+            lost["dissipated"] = sum(spent.values()) + self.sample.lost * self.model.scales.moment
         return {"kinetic": kinetic, "elastic": elastic, **lost, "loads": loads, "total": kinetic + elastic + loads}
 
     @functools.cached_property
@@ -183,6 +210,46 @@ class MotionState(Configuration):
         """The quantities of this time as nested dictionaries, of which :meth:`Trajectory.to_dict` makes lists."""
         tables = self.tables("nodes", "reactions", "springs", "tendons", "tubes", "motions")
         return {**tables, "energy": self.energy, "momentum": self.momentum}
+
+
+@dataclass(frozen=True)
+class StopEvent:
+    """When a tendon becomes taut or slack, or a stop of a spring is reached or left.
+
+    Attributes
+    ----------
+    time : float
+        s.
+    name : str
+        ``tendons.NAME`` or ``springs.NAME``.
+    side : str
+        ``taut`` of a tendon; ``low`` or ``high`` of a stop.
+    acts : bool
+        Whether the tendon is taut, or the spring at its stop, from then on.
+    impulse : float
+        Of the tension or the stop, not below zero, N s; N m s of a stop of an angle; zero where nothing hits.
+    dissipated : float
+        The energy that all impulses of that time dissipate, J, at the largest of them; else zero.
+    turns : bool
+        Whether it is a stop of an angle.
+    """
+
+    time: float
+    name: str
+    side: str
+    acts: bool
+    impulse: float
+    dissipated: float
+    turns: bool = False
+
+    def __str__(self) -> str:
+        when, unit = f"at {self.time:.9g} s {self.name}", "N m s" if self.turns else "N s"
+        what = f"{'at' if self.acts else 'off'} its {self.side} stop"
+        if self.side == "taut":
+            what = "taut" if self.acts else "slack"
+        hit = f", after an impulse of {number_in_words(self.impulse, unit)}" if self.impulse else ""
+        lost = f", {number_in_words(self.dissipated, 'N m')} dissipated" if self.dissipated else ""
+        return f"{when}: {what}{hit}{lost}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,6 +281,8 @@ class Trajectory:
         Why the motion ended early; empty where it did not.
     record : StepRecord or None
         The time steps of the integrator, which :meth:`between` and :meth:`resampled` interpolate; None of ``idas``.
+    events : tuple of StopEvent
+        When tendons became taut or slack, and stops of springs were reached or left, in the order of time.
     """
 
     scene: Any = field(repr=False)
@@ -228,6 +297,7 @@ class Trajectory:
     notes: tuple[str, ...] = ()
     failure: str = ""
     record: StepRecord | None = field(repr=False, default=None)
+    events: tuple[StopEvent, ...] = field(repr=False, default=())
 
     def __repr__(self) -> str:
         answers = f"{counted(len(self.steps), 'answer')} from {self.steps[0].time:g} to {self.last.time:g} s"
@@ -359,6 +429,7 @@ class Trajectory:
             **({"error_of": self.error_of} if self.error_of else {}),
             "violation": dict(self.violation),
             "notes": list(self.notes),
+            **({"events": [vars(event) for event in self.events]} if self.scene.stopped else {}),
             "times": self.times.tolist(),
             **_columns([step.to_dict() for step in self.steps]),
         }

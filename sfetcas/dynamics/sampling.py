@@ -19,7 +19,7 @@ from ..mathematics.arrays import Array, unit
 from ..mathematics.interpolation import differentiation, evaluation
 from .integrating import Memory, Taken
 
-__all__ = ["Sample", "Sampler", "StepRecord", "between"]
+__all__ = ["Sample", "Sampler", "StepRecord", "between", "turned_by"]
 
 DOUBTFUL = 10.0
 """How much more one node less may change the polynomial through ends: that of all stages does not show its error."""
@@ -46,6 +46,10 @@ class Sample:
         Angles that count turns.
     remembered : ndarray
         What members remember at the begin of the step in which it is.
+    acting : ndarray
+        Which one-sided rows act, see :class:`~sfetcas.dynamics.integrating.Memory`.
+    lost : float
+        Energy lost in impacts so far.
     """
 
     t: float
@@ -57,6 +61,8 @@ class Sample:
     spin: Array
     unwrapped: Array
     remembered: Array = field(default_factory=lambda: np.zeros(0))
+    acting: Array = field(default_factory=lambda: np.zeros(0))
+    lost: float = 0.0
 
 
 class Sampler:
@@ -213,20 +219,20 @@ def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -
         nodes += [(taken.begin.t - begin.t + c * taken.h) / h for c in taken.places[chosen]]
         x += list(taken.x[chosen] + taken.begin.origin[1])
         y += list(taken.begin.y + taken.shifts[chosen] + taken.begin.origin[0])
-        turns += [_from(begin.q, _turned(taken.begin.q, turn)) for turn in taken.turns[chosen]]
+        turns += [_from(begin.q, turned_by(taken.begin.q, turn)) for turn in taken.turns[chosen]]
     at, here = np.array(nodes), np.array([(t - begin.t) / h])
     row = evaluation(at, here)
     middle = own.after.x + own.after.origin[1]
     quantities = np.array(x) - middle
     turn = np.einsum("n,nra->ra", row[0], np.array(turns))
-    q, slope = _turned(begin.q, turn), np.einsum("n,nra->ra", (row @ differentiation(at))[0], np.array(turns)) / h
+    q, slope = turned_by(begin.q, turn), np.einsum("n,nra->ra", (row @ differentiation(at))[0], np.array(turns)) / h
     spin = slope if slope.shape[1] == 1 else quaternion.angular_velocity(turn, slope)
     v, a = _rates(at, here, quantities)
     # Without the node that is furthest.
     near = np.delete(np.arange(len(at)), int(np.abs(at - here).argmax()))
     doubt = np.abs(a - _rates(at[near], here, quantities[near])[1]).max(initial=0.0) if len(at) > 2 else 0.0
     position = middle + (row @ quantities)[0]
-    given = own.after.unwrapped, begin.remembered
+    given = own.after.unwrapped, begin.remembered, begin.acting, begin.lost
     sample = Sample(t, q, (row @ np.array(y))[0], position, v / h, a / h**2, spin, *given)
     return sample, float(doubt) / h**2
 
@@ -246,11 +252,13 @@ def between(samples: Sequence[Sample], t: float) -> Sample:
     def mean(part: str) -> Array:
         return np.tensordot(row, np.array([getattr(sample, part) for sample in samples]), 1)
 
-    q = _turned(near.q, np.einsum("n,nra->ra", row, turns))
-    return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), mean("spin"), near.unwrapped, near.remembered)
+    q = turned_by(near.q, np.einsum("n,nra->ra", row, turns))
+    given = near.unwrapped, near.remembered, near.acting, near.lost
+    return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), mean("spin"), *given)
 
 
-def _turned(q: Array, turn: Array) -> Array:
+def turned_by(q: Array, turn: Array) -> Array:
+    """Rotations (rotations, components) turned further by vectors (rotations, turns), fixed axes."""
     if q.shape[1] == 1:
         return q + turn
     return unit(quaternion.multiply(quaternion.from_rotation_vector(turn), q))

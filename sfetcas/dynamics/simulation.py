@@ -26,15 +26,18 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
+from ..mechanics.one_sided import all_stops, one_sided_of
 from ..stopping import arrived
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
 from .conserving import Conserving
+from .events import TOGETHER
 from .idas import Idas
 from .inertia import Inertia
 from .inertialess import check_balanced, check_resisted
-from .integrators import SHORTEST, InitialState, Integrator, Stages, TimeGrid
+from .integrating import SHORTEST
+from .integrators import InitialState, Integrator, Stages, TimeGrid
 from .methods import GeneralisedAlpha, Radau
-from .motion import MotionState, Mover, Trajectory
+from .motion import MotionState, Mover, StopEvent, Trajectory
 from .sampling import StepRecord
 from .shaping import shaped, stretched
 from .stages import StageEquations
@@ -97,7 +100,7 @@ def simulate(scene: Scene, settings: Settings, progress: Callable[[float], Any] 
 @dataclass
 class MeshRun:
     """The result of one run on one mesh: states, number of steps, largest errors of constraints and norms, notes,
-    times, steps.
+    times, steps, events.
     """
 
     instants: list[MotionState]
@@ -109,6 +112,7 @@ class MeshRun:
     failure: SolveError | None = None
     interrupted: bool = False
     record: StepRecord | None = None
+    events: tuple[StopEvent, ...] = ()
 
 
 class Simulation:
@@ -125,7 +129,7 @@ class Simulation:
         meshing = Meshing(self.scene, settings)
         self.accuracy, self.asked, self.quantity = meshing.accuracy, meshing.asked, meshing.quantity
         self.prescribed = meshing.prescribed
-        self.mesh: Mesh = replace(meshing.target, places=True)
+        self.mesh: Mesh = replace(meshing.target, places=True, stops=all_stops(scene))
         self.seconds = {"model": 0.0, "build": 0.0, "solve": 0.0}
 
     # -- times ----------------------------------------------------------------------------------------
@@ -165,12 +169,13 @@ class Simulation:
         analysis = self.scene.analysis
         steps = USUAL_STEPS if before is None else 2 * before
         steps = steps if analysis.step is None else int(analysis.duration / analysis.step)
-        system = StageEquations(equations, masses, self.settings.kernels, calls=CALLS * max(steps, 1))
+        one_sided = one_sided_of(model)
+        system = StageEquations(equations, masses, self.settings.kernels, CALLS * max(steps, 1), one_sided)
         integrator = INTEGRATORS[self.name](system, self.progress)
         self.seconds["model"] += built - begin
         self.seconds["build"] += time.perf_counter() - built
-        begun, notes = self.begun(system)
         mover = Mover(equations, Inertia(system), masses.time, system.factors)
+        begun, notes = self.begun(system, mover.acting(np.zeros(len(one_sided))) if len(one_sided) else None)
         beyond = min((t for t in self._kinks if t >= analysis.duration), default=np.inf)
         watch = None if analysis.until is None else Watch(analysis.until, mover)
         times = self.times if watch is None else finer(self.times)
@@ -203,9 +208,12 @@ class Simulation:
         if watch is None or not watch.ended:
             run.instants += [mover.instant(sample) for sample in integrator.rest()]
         if watch is not None:
-            run.instants = watch.up_to_end(run.instants, self.times)
+            record = integrator.record if len(one_sided) else None
+            run.instants = watch.up_to_end(run.instants, self.times, None if record is None else record.sample)
             run.notes = (*run.notes, watch.note(run.instants))
         run.count, run.gap, run.norm, run.record = integrator.count, integrator.gap, integrator.norm, integrator.record
+        ended = run.instants[-1].time if run.instants else 0.0
+        run.events = tuple(event for event in map(mover.event, integrator.events) if event.time <= ended)
         self.seconds["solve"] += time.perf_counter() - solving
         return run
 
@@ -221,8 +229,8 @@ class Simulation:
             status = Status.OUTSIDE if instant.fields.beyond_tables() else Status.BENT
             raise SolveError(status, f"at {instant.time:.6g} s: {message}")
 
-    def begun(self, system: StageEquations) -> tuple[InitialState, tuple[str, ...]]:
-        """Where the motion begins, and what is to be said of it."""
+    def begun(self, system: StageEquations, free: Equations | None = None) -> tuple[InitialState, tuple[str, ...]]:
+        """Where the motion begins, and what is to be said of it; ``free`` are equations without one-sided rows."""
         model = system.model
         state = at_rest(model)
         notes: tuple[str, ...] = ()
@@ -233,7 +241,11 @@ class Simulation:
         loading = system.loading(factors)
         state = stretched(equations, equations.holding(state, loading), loading)
         if any(member.turned is not None for member in self.scene.members.values()):
-            state, notes = shaped(equations, state, loading)
+            if free is not None:
+                loading = system.loading_of(free.model, 0.0)
+            found, notes = shaped(free or equations, system.state_of((free or equations).model, state), loading)
+            state = replace(found, lam=state.lam, unwrapped=model.unwrapping.angles(found.q, state.unwrapped))
+        touching = self._touching(system, state)
         if self.weightless:
             if self.name == "conserving":
                 message = (
@@ -241,12 +253,32 @@ class Simulation:
                 )
                 accepted = "accepted: radau-3, radau-2 or generalised-alpha, or a small rhoA"
                 raise SceneError(f"{message}, {accepted}", ("analysis", "integrator"))
-            beginning = _Beginning(system)
+            beginning = _Beginning(system, touching)
             if self.scene.analysis.initial == "equilibrium":
                 state = beginning.settled(state, factors)
             beginning.check(state, factors)
-        rates, more = velocities(system, equations, state)
-        return InitialState(state, rates, *system.rates(state, factors, rates)), (*notes, *more)
+        if free is not None:
+            equations = free
+        rates, more = velocities(system, equations, system.state_of(equations.model, state))
+        return InitialState(state, rates, *system.rates(state, factors, rates), touching), (*notes, *more)
+
+    def _touching(self, system: StageEquations, state: State) -> Array:
+        """One-sided rows that may act at the begin, (rows,), 1 or 0."""
+        rows = system.one_sided
+        if not len(rows):
+            return np.zeros(0)
+        if self.scene.analysis.initial == "equilibrium":
+            return rows.acting(self.before.model.mesh.stops)
+        opened = system.openings(state, 0.0)
+        worst = int(np.argmin(opened))
+        if opened[worst] < -TOGETHER:
+            table, name = rows.names[worst].split(".", 1)
+            missing = -opened[worst] * system.model.scales.length
+            message = (
+                f"found {missing:.3g} m shorter than its way at t = 0, accepted: as long, or initial = 'equilibrium'"
+            )
+            raise SceneError(message, (table, name))
+        return (opened <= TOGETHER).astype(float)
 
     @property
     def before(self) -> Equilibrium:
@@ -359,6 +391,7 @@ class Simulation:
             notes=(*run.notes, *self._unlikely(run), *self._superelement_notes(run), *self._law_notes(run)),
             failure="" if run.failure is None else run.failure.detail,
             record=run.record,
+            events=run.events,
         )
         if run.failure is not None:
             if motion.steps:
@@ -393,7 +426,7 @@ class Simulation:
         if run.gap > DRIFTED:
             return (f"joints are off by {run.gap:.0e}: {short}",)
         kinetic, elastic, loads = np.array([instant.energies for instant in run.instants]).T
-        total = kinetic + elastic + loads
+        total = kinetic + elastic + loads + np.array([instant.sample.lost for instant in run.instants])
         most = float(kinetic.max() + np.ptp(elastic) + np.ptp(loads))
         changed = float(np.abs(total - total[0]).max())
         if _keeps_energy(run.instants[0].model) and changed > LOST * most > 0.0:
@@ -453,8 +486,11 @@ LOST = 0.05
 class _Beginning:
     """What acts at the begin, without velocities and accelerations, dimensionless."""
 
-    def __init__(self, system: StageEquations) -> None:
+    def __init__(self, system: StageEquations, touching: Array | None = None) -> None:
         n = system.layout
+        touching = np.zeros(len(system.one_sided)) if touching is None else touching
+        rows = system.one_sided.rows[touching == 0.0]
+        self._touching, self._idle = touching, system.equations.unknowns + rows
         q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
         factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
         stage = system.stage(q, y, lam, ca.MX.zeros(n.x), factors, unwrapped)
@@ -465,8 +501,11 @@ class _Beginning:
 
     def __call__(self, state: State, lam: Array, factors: Array) -> tuple[Array, Array, Array, Array]:
         """Stiffness with closings, masses and dampers, (total, total) each, and the sum of all forces (total,)."""
-        given = (state.q.T, state.y, lam, factors, self._system.counted(state))
+        given = (state.q.T, state.y, lam, factors, self._system.counted(state, self._touching))
         stiffness, mass, damping, forces = (np.array(part) for part in self._function.call([ca.DM(x) for x in given]))
+        # What does not act is a number of its own.
+        stiffness[self._idle], stiffness[:, self._idle] = 0.0, 0.0
+        stiffness[self._idle, self._idle] = 1.0
         return stiffness, mass, damping, forces.ravel()
 
     def check(self, state: State, factors: Array) -> None:

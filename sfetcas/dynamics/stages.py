@@ -60,23 +60,25 @@ class StageEquations(System):
             entries += [one.coupled(other, c[i, j], b[i, j]) for j, other in enumerate(found)]
         # Of the last stage: that of the first of two stages of Radau's vanishes.
         inertia = [b[stages - 1, stages - 1]] * stages
-        step = self.solved(entries, inertia, ca.horzcat(*[stage.residual for stage in found]))
+        step = self.solved(entries, inertia, ca.horzcat(*[stage.residual for stage in found]), unwrapped)
         turned, shift, more, size = self.moved(parts, step)
         results = [ca.horzcat(*turned), y + shift, lam + more, size]
         names = ["q", "y", "lam", "x0", "v", "a", "C", "B", "factors", "unwrapped"]
         arguments = [q, y, lam, x0, v, a, c, b, factors, unwrapped]
         return ca.Function(f"iteration_{stages}", arguments, results, names, ["q_next", "y_next", "lam_next", "size"])
 
-    def solved(self, entries: list[ca.MX], inertia: list[ca.MX], residual: ca.MX) -> ca.MX:
+    def solved(self, entries: list[ca.MX], inertia: list[ca.MX], residual: ca.MX, unwrapped: ca.MX) -> ca.MX:
         """The Newton step of all stages, (total, stages), for matrix entries in the order of their positions.
 
         ``inertia`` multiplies the accelerations in each stage.  Relative to the masses so weighted, the constraint rows
         of the matrix (not of the equations) get a small diagonal, so that dependent constraints do not make it
-        singular.
+        singular, and a large one where a row does not act.
         """
         stages = residual.shape[1]
         system = self._system(stages)
         dual = [-DUAL_REGULARISATION / part for part in inertia]
+        if len(self.one_sided):
+            dual += [-(1.0 - self.acting(unwrapped)) / (DUAL_REGULARISATION * part) for part in inertia]
         matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries, *dual)))
         left = ca.vec(residual.T)
         found = self._eliminated(matrix, left[system.order], stages)
@@ -147,6 +149,9 @@ class StageEquations(System):
         blocks += [(i, j, coupled, probe.coupled.count) for i in range(stages) for j in range(stages)]
         rows = np.arange(self.equations.unknowns, self.total)
         blocks += [(i, i, (rows, rows, np.ones(len(rows)), np.zeros(len(rows), np.intp)), 1) for i in range(stages)]
+        if len(self.one_sided):
+            own = self.equations.unknowns + self.one_sided.rows
+            blocks += [(i, i, (own, own, np.ones(len(own)), np.arange(len(own))), len(own)) for i in range(stages)]
         size, first, flat, weights, entries = self.total * stages, 0, [], [], []
         for i, j, (r, c, weight, number), count in blocks:
             flat.append((place[c] * stages + j) * size + place[r] * stages + i)
@@ -214,6 +219,7 @@ class _Stage:
         self, system: StageEquations, q: ca.MX, y: ca.MX, lam: ca.MX, forces: ca.MX, given: Given, unwrapped: ca.MX
     ) -> None:
         self._system = system
+        lam = system.switched(lam, unwrapped)
         # What acts along the elements: loads, internal forces, inertia.
         linear = forces[: system.linear]
         further = Forces(times(system.by_place.T, linear), times(system.by_tangent.T, linear))
@@ -232,6 +238,9 @@ class _Stage:
             entries.append(ca.vec(found[4]))
             self._rotation_jacobians.append(found[5])
         self.residual = static.gathered(shares)
+        if len(system.one_sided):
+            n = system.equations.unknowns
+            self.residual = ca.vertcat(self.residual[:n], system.switched(self.residual[n:], unwrapped))
         self.entries = ca.vertcat(*entries, ca.MX(1))
 
     def coupled(self, other: _Stage, c: ca.MX, b: ca.MX) -> ca.MX:

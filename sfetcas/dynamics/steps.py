@@ -52,6 +52,7 @@ def step_function(system: StageEquations, method: Method) -> ca.Function:
     stages, moved, multipliers, size, count = newton(*guess, *constants)
     parts = ca.horzsplit(stages, n.rotations)
     there = ca.horzcat(*[system.moving(parts[i], moved[:, i], given[i], unwrapped) for i in range(s)])
+    gaps = system.gaps(parts[-1], moved[:, -1], given[-1], unwrapped)
     results = [
         parts[-1],
         moved[:, -1],
@@ -62,7 +63,7 @@ def step_function(system: StageEquations, method: Method) -> ca.Function:
         method.after(h, rates, there - ca.repmat(x, 1, s)),
         size,
         count,
-        ca.norm_inf(ca.vertcat(0.0, system.gaps(parts[-1], moved[:, -1], given[-1], unwrapped))),
+        ca.norm_inf(ca.vertcat(0.0, system.switched(gaps, unwrapped))),
     ]
     names = ["q", "y", "lam", "turns", "shifts", "x", "rates", "ratio", "h", "factors", "unwrapped"]
     arguments = [q, y, lam, turns, shifts, x, rates, ratio, h, loads, unwrapped]

@@ -26,6 +26,8 @@ from ..mechanics.expressions import Expressions, Given, moved_by
 from ..mechanics.loading import Loading
 from ..mechanics.masses import Masses, Observables
 from ..mechanics.memory import Remembering
+from ..mechanics.model import Model
+from ..mechanics.one_sided import NONE, OneSided
 from ..mechanics.singles import arms_product, weighted_product
 from ..mechanics.terms import rows_of
 
@@ -54,16 +56,26 @@ class System(Expressions):
         ``compiled``, ``interpreted`` or ``auto`` element functions.
     calls : float
         Expected number of calls, by which ``auto`` decides.
+    one_sided : OneSided
+        Rows that are switched on and off in time; the model contains all of them.
     """
 
     layout: Layout
 
-    def __init__(self, equations: Equations, masses: Masses, kernels: Kernels = "auto", calls: float = 1e4) -> None:
+    def __init__(
+        self,
+        equations: Equations,
+        masses: Masses,
+        kernels: Kernels = "auto",
+        calls: float = 1e4,
+        one_sided: OneSided = NONE,
+    ) -> None:
         super().__init__(equations, kernels, calls)
         if len(self.model.positions.E.value):
             raise ValueError("motion needs the nodal assembly on a mesh with a place at every cut")
         self.masses, self.memory = masses, Remembering(self.model)
         self._memory = {number: (group, part) for number, group, part in self.memory.parts()}
+        self.one_sided = one_sided
         self.observed = [self.tables.sides_of(group) for group in masses.observables]
         self._place()
         self._weigh()
@@ -128,13 +140,14 @@ class System(Expressions):
         sizes = [group.kind.sizes[2] * len(group.data) for group in masses.observables]
         bounds = np.cumsum([self.linear, *sizes]).tolist()
         self.ranges = list(zip(bounds, bounds[1:], strict=False))
-        # What members remember is given with the angles that count turns, and changes as seldom.
-        given = self.layout.unwrapped + self.memory.size
+        # What members remember, and which one-sided rows act, is given with the angles that count turns, and changes
+        # as seldom.
+        given = self.layout.unwrapped + self.memory.size + len(self.one_sided)
         self.layout = Layout(**{**vars(self.layout), "unwrapped": given}, x=bounds[-1])
 
     def data(self, number: int, given: Given, unwrapped: ca.MX) -> ca.MX:
         """As of :meth:`.SymbolicTerms.data`, with what members remember from behind the angles in ``unwrapped``."""
-        data, angles = super().data(number, given, unwrapped), self.layout.unwrapped - self.memory.size
+        data, angles = super().data(number, given, unwrapped), self.model.unwrapping.count
         if number - 1 not in self._memory:
             return data
         group, part = self._memory[number - 1]
@@ -143,13 +156,33 @@ class System(Expressions):
         data[columns, :] = ca.reshape(own, len(columns), len(group.data))
         return data
 
-    def counted(self, state: State) -> Array:
-        """The angles that count turns in a state, and what members remember at the begin."""
-        return np.concatenate([state.unwrapped, self.memory.begun[: self.memory.size]])
+    def counted(self, state: State, acting: Array | None = None) -> Array:
+        """The angles that count turns in a state, what members remember at the begin, and which one-sided rows act.
 
-    @functools.cached_property
-    def _rates(self) -> ca.Function:
-        """(q, y, factors, unwrapped, step) -> quantities, and their derivative along a step of the unknowns."""
+        By default all do.
+        """
+        acting = np.ones(len(self.one_sided)) if acting is None else acting
+        return np.concatenate([state.unwrapped, self.memory.begun[: self.memory.size], acting])
+
+    def switched(self, rows: ca.MX, unwrapped: ca.MX) -> ca.MX:
+        """Numbers of the rows (rows,), such as gaps or multipliers, zero where a one-sided row does not act."""
+        count = len(self.one_sided)
+        if not count:
+            return rows
+        acting = ca.MX.ones(self.layout.lam)
+        acting[self.one_sided.rows.tolist()] = self.acting(unwrapped)
+        return rows * acting
+
+    def acting(self, unwrapped: ca.MX) -> ca.MX:
+        """For each one-sided row whether it acts, 1 or 0."""
+        return unwrapped[self.layout.unwrapped - len(self.one_sided) :]
+
+    def _along(self, *, timed: bool) -> ca.Function:
+        """(q, y, factors, unwrapped, step, faster) -> quantities and their derivative along a step of the unknowns.
+
+        Where it is ``timed`` rates of the factors, ``faster``, have a share in the derivative, and gaps of all rows and
+        their derivative follow.
+        """
         n = self.layout
         q, y = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y)
         factors, unwrapped, step = (
@@ -157,18 +190,47 @@ class System(Expressions):
             ca.MX.sym("unwrapped", n.unwrapped),
             ca.MX.sym("step", self.total),
         )
-        along = ca.MX.sym("along")
+        along, faster = ca.MX.sym("along"), ca.MX.sym("faster", n.factors)
         spin = self.spins(along * step)
         shift = along * step[self.equations.rotation_unknowns : self.equations.unknowns]
-        x = self.moving(moved_by(self, q, spin), y + shift, self.given(factors), unwrapped)
-        rate = ca.substitute([x, ca.jtimes(x, along, ca.MX(1))], [along], [ca.MX(0)])
-        return ca.Function("rates", [q, y, factors, unwrapped, step], rate)
+        given, turned = self.given(factors + along * faster if timed else factors), moved_by(self, q, spin)
+        turned = self.with_prescribed_rotations(turned, given) if timed else turned
+        seen = [self.moving(turned, y + shift, given, unwrapped)]
+        if timed:
+            seen.append(self.gaps(turned, y + shift, given, unwrapped))
+        both = [part for x in seen for part in (x, ca.jtimes(x, along, ca.MX(1)))]
+        arguments = [q, y, factors, unwrapped, step, faster]
+        return ca.Function("rates", arguments, ca.substitute(both, [along], [ca.MX(0)]))
+
+    @functools.cached_property
+    def _rates(self) -> ca.Function:
+        """As of :meth:`_along` at factors that do not change."""
+        return self._along(timed=False)
+
+    @functools.cached_property
+    def _rates_in_time(self) -> ca.Function:
+        """As of :meth:`_along` at factors that change."""
+        return self._along(timed=True)
 
     def rates(self, state: State, factors: Array, step: Array) -> tuple[Array, Array]:
         """Quantities (quantities,) at a state, and their rates for the rates ``step`` (unknowns,) of the unknowns."""
+        x, v = self._rated(self.interpreted._rates, state, factors, step, np.zeros(self.layout.factors))
+        return x, v
+
+    def rates_in_time(
+        self, state: State, factors: Array, step: Array, faster: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Quantities (quantities,) at a state with their rates, and gaps of all rows (rows,) with theirs.
+
+        ``step`` (unknowns,) are rates of the unknowns, ``faster`` those of the factors.
+        """
+        x, v, gaps, opening = self._rated(self.interpreted._rates_in_time, state, factors, step, faster)
+        return x, v, gaps, opening
+
+    def _rated(self, function: ca.Function, state: State, factors: Array, step: Array, faster: Array) -> list[Array]:
         full = np.concatenate([step, np.zeros(self.equations.rows)])
-        x, v = self.interpreted._rates(state.q.T, state.y, factors, self.counted(state), full)
-        return np.array(x).ravel(), np.array(v).ravel()
+        found = function(state.q.T, state.y, factors, self.counted(state), full, faster)
+        return [np.array(part).ravel() for part in found]
 
     @functools.cached_property
     def floating(self) -> tuple[Array, Array] | None:
@@ -201,7 +263,9 @@ class System(Expressions):
     @functools.cached_property
     def interpreted(self) -> Self:
         """This system with interpreted kernels: compiled functions cannot be differentiated by CasADi."""
-        return self if self._kernels == "interpreted" else type(self)(self.equations, self.masses, "interpreted")
+        if self._kernels == "interpreted":
+            return self
+        return type(self)(self.equations, self.masses, "interpreted", one_sided=self.one_sided)
 
     @functools.cached_property
     def histories(self) -> tuple[History | None, ...]:
@@ -219,6 +283,33 @@ class System(Expressions):
         """Loads and prescribed motions for factors (groups,) of their groups, dimensionless."""
         groups = [loading.scaled(float(f)) for loading, f in zip(self.loadings, factors, strict=True)]
         return functools.reduce(Loading.plus, groups)
+
+    def loading_of(self, model: Model, t: float) -> Loading:
+        """As :meth:`loading` at a dimensionless time, of a model of the same scene with other one-sided rows."""
+        histories, seconds = model.scene.histories, t * self.masses.time
+        factors = {name: 1.0 if name is None else histories[name].factor(seconds) for name in model.groups}
+        groups = [loading.scaled(factors[name]) for name, loading in model.groups.items()]
+        return functools.reduce(Loading.plus, [*groups, *model.standing])
+
+    def state_of(self, model: Model, state: State) -> State:
+        """A state without multipliers, as one of a model of the same scene with other one-sided rows."""
+        names, own = self.model.unwrapping.names, model.unwrapping.names
+        unwrapped = state.unwrapped if own == names else state.unwrapped[[names.index(name) for name in own]]
+        return State(state.q, state.y, np.zeros(len(model.row_names)), unwrapped)
+
+    def openings(self, state: State, t: float) -> Array:
+        """How far the one-sided rows (rows,) are open at a state and a dimensionless time; violated below zero."""
+        return np.array(self._opening(state.q.T, state.y, self.factors(t), self.counted(state))).ravel()
+
+    @functools.cached_property
+    def _opening(self) -> ca.Function:
+        """(q, y, factors, unwrapped) -> openings of the one-sided rows."""
+        n, rows = self.layout, self.one_sided
+        q, y = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y)
+        factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
+        given = self.given(factors)
+        gaps = self.gaps(self.with_prescribed_rotations(ca.MX(q), given), y, given, unwrapped)
+        return ca.Function("openings", [q, y, factors, unwrapped], [-ca.DM(rows.signs) * gaps[rows.rows.tolist()]])
 
     def paired(self, rows: int, width: int, n: int) -> ca.Function:
         """A function (A, B, w) -> A^T diag(w) B for each of n blocks of ``rows`` rows and ``width`` columns."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from ..equilibria.quantities import value_of
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from .motion import MotionState, Mover
-from .sampling import between
+from .sampling import Sample, between
 
 __all__ = ["Watch", "finer"]
 
@@ -47,14 +48,19 @@ class Watch:
             raise error.within("analysis", "until", "quantity") from None
         return number - until.above if until.above is not None else float(until.below or 0.0) - number
 
-    def up_to_end(self, instants: list[MotionState], times: Array) -> list[MotionState]:
-        """The states at the times (n,) of the answer, s, up to the end, and the interpolated state at the end."""
+    def up_to_end(
+        self, instants: list[MotionState], times: Array, sample: Callable[[float], Sample] | None = None
+    ) -> list[MotionState]:
+        """The states at the times (n,) of the answer, s, up to the end, and the interpolated state at the end.
+
+        ``sample`` tells the sample at a dimensionless time; by default it is interpolated between the states.
+        """
         wanted = [
             instant for instant in instants if np.isclose(instant.time, times, rtol=tolerances.DECIMAL, atol=0.0).any()
         ]
         if self._last is None:
             return wanted
-        end = self._end(instants)
+        end = self._end(instants, sample)
         return [*(instant for instant in wanted if instant.time < end.time), end]
 
     def note(self, instants: Sequence[MotionState]) -> str:
@@ -66,19 +72,20 @@ class Watch:
         when = "at its begin already" if self._last == 0 else f"at {instants[-1].time:.9g} s"
         return f"the motion ended {when}, as {until.quantity} was {beyond}"
 
-    def _end(self, instants: list[MotionState]) -> MotionState:
+    def _end(self, instants: list[MotionState], sample: Callable[[float], Sample] | None) -> MotionState:
         last = self._last
         assert last is not None
         if last == 0:
             return instants[0]
         first = max(0, min(last - AROUND // 2, len(instants) - AROUND))
         samples = [instant.sample for instant in instants[first : first + AROUND]]
+        sample = partial(between, samples) if sample is None else sample
         low, high = instants[last - 1].sample.t, instants[last].sample.t
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            beyond = self._excess(self._mover.instant(between(samples, middle))) >= 0.0
+            beyond = self._excess(self._mover.instant(sample(middle))) >= 0.0
             low, high = (low, middle) if beyond else (middle, high)
-        return self._mover.instant(between(samples, high))
+        return self._mover.instant(sample(high))
 
 
 AROUND = 6

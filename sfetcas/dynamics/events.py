@@ -1,0 +1,384 @@
+"""Events of a motion with one-sided rows: when rows begin and cease to act, and what an impact does to velocities.
+
+Each one-sided row has an opening, which is not below zero, and a force, which is not either; one of them is zero.
+Between events the motion is that of a system in which the rows that act are constraints, and the others are absent.
+
+- The force of a row falls through zero: it ceases to act.  Velocities do not change.
+- The opening of a row falls through zero: an impact, see :mod:`~sfetcas.dynamics.impacts`.
+
+After either of them the rows that stay closed are those whose forces are not below zero at once.
+
+Times are those at which a step from the begin of the present one ends at zero, so that they are as accurate as steps
+are.  Forces are multipliers of rows, whose order in the length of the step is less than that of positions; where they
+decide they are those of a short step from there, from velocities that the rows allow.
+
+Where impacts come ever closer, as between two rows at an acute angle, the rows stay closed once the way between two of
+them is next to nothing.
+
+Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts (1996).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import SolveError, Status
+from ..mathematics.arrays import Array
+from ..mathematics.interpolation import evaluation
+from ..mechanics.equations import State
+from .impacts import Impacts
+from .integrating import SHORTEST, Memory, Passed, Stepper, Taken
+from .sampling import turned_by
+
+__all__ = ["TOGETHER", "Event", "Events"]
+
+
+@dataclass(frozen=True)
+class Event:
+    """What happens to a row; everything is dimensionless.
+
+    Attributes
+    ----------
+    t : float
+    row : int
+        Its number among the one-sided ones.
+    acts : bool
+        Whether it acts from then on.
+    impulse : float
+        Along the row.
+    lost : float
+        The energy that all impulses of that time take away, at the largest of them; else zero.
+    """
+
+    t: float
+    row: int
+    acts: bool
+    impulse: float
+    lost: float
+
+
+class Events:
+    """Finds the events within time steps, and the states after them.
+
+    Parameters
+    ----------
+    stepper : Stepper
+        Of a system with one-sided rows.
+    span : float
+        Dimensionless time of the whole motion.
+
+    Attributes
+    ----------
+    found : list of Event
+    """
+
+    def __init__(self, stepper: Stepper, span: float) -> None:
+        self.stepper, self.system, self._span = stepper, stepper.system, span
+        self.rows, self.signs = self.system.one_sided.rows, self.system.one_sided.signs
+        self._impacts, self.found = Impacts(self.system), list[Event]()
+        self._offset = np.zeros(len(self.rows))
+        # Times of events, and the times and speeds of impacts.
+        self._times: list[float] = []
+        self._hits: list[tuple[float, float]] = []
+
+    # -- begin ----------------------------------------------------------------------------------------
+
+    def begun(self, memory: Memory, h: float) -> Memory:
+        """The state after what happens at the begin, where the rows that it calls acting are those that touch.
+
+        ``h`` is the expected length of a step.
+        """
+        touching = memory.acting > 0.0
+        idle = replace(memory, acting=np.zeros(len(self.rows)))
+        after = self._after(idle, touching, np.zeros(len(self.rows), bool), h)
+        self.found[:] = [event for event in self.found if event.impulse]
+        return after
+
+    # -- within a step --------------------------------------------------------------------------------
+
+    def within(self, taken: Taken) -> Passed | None:
+        """What happens first in a step that was taken; None where nothing does."""
+        closing, released = self._closing(taken), self._released(taken)
+        if closing is None and released is None:
+            return None
+        self._refuse_endless(taken.begin)
+        share = min(one for one in (closing, released) if one is not None)
+        steps = self._advanced(taken, share) if share * taken.h > SHORTEST else []
+        memory = steps[-1].after if steps else taken.begin
+        acting = memory.acting > 0.0
+        if released is None or share < released:
+            opened = np.where(acting, np.inf, self._openings(memory))
+            # The first of them, which may be at the end of a step that is too short, and those that close with it.
+            closes = opened <= max(TOGETHER, float(opened.min()))
+            return Passed(steps, self._after(memory, closes, np.zeros(len(acting), bool), taken.h))
+        forces = np.where(acting, self._forces(self._consistent(memory), self._length(taken.h))[0], np.inf)
+        ceases = np.arange(len(acting)) == np.argmin(forces)
+        return Passed(steps, self._after(memory, np.zeros(len(acting), bool), ceases, taken.h))
+
+    def _at(self, taken: Taken, share: float) -> Memory:
+        """The state after a share of a step that was taken."""
+        if share == 1.0 and self.stepper.method.stages > 1:
+            return taken.after
+        return self._advanced(taken, share)[-1].after if share * taken.h > SHORTEST else taken.begin
+
+    def _refuse_endless(self, memory: Memory) -> None:
+        """Refuse events that follow each other without an end of them in sight."""
+        self._times.append(memory.t)
+        if len(self._times) > MOST and memory.t - self._times[-MOST - 1] < BRIEF * self._span:
+            seconds = memory.t * self.stepper.time
+            names = ", ".join(dict.fromkeys(self.system.one_sided.names[event.row] for event in self.found[-MOST:]))
+            detail = f"at {seconds:.9g} s one impact or release follows another, {MOST} of them, of {names}"
+            raise SolveError(Status.STOPPED, detail, memory)
+
+    def _ebbs(self, t: float, speed: float) -> bool:
+        """Whether an impact is one of infinitely many that come ever closer: rows that it goes between stay closed."""
+        self._hits = [*self._hits[-REPEATED:], (t, speed)]
+        times, speeds = np.array(self._hits).T
+        falling = len(speeds) > REPEATED and bool((np.diff(speeds) < 0.0).all() and (np.diff(times, 2) < 0.0).all())
+        return falling and speed * (times[-1] - times[-2]) < EBBED
+
+    def _advanced(self, taken: Taken, share: float) -> list[Taken]:
+        """Steps from the begin of one that was taken over a share of it.
+
+        Of a method with one stage it takes several, between which the motion can be interpolated.
+        """
+        count = 1 if self.stepper.method.stages > 1 else PARTS
+        memory, steps = taken.begin, list[Taken]()
+        for _ in range(count):
+            steps.append(self.stepper.step(memory, share * taken.h / count))
+            if not steps[-1].converged:
+                seconds = taken.begin.t * self.stepper.time
+                raise SolveError(Status.STOPPED, f"no event could be located after {seconds:.9g} s", taken.begin)
+            memory = steps[-1].after
+        return steps
+
+    def _closing(self, taken: Taken) -> float | None:
+        """Share of a step after which the first row closes; None where none does."""
+        idle = taken.begin.acting == 0.0
+        if not idle.any():
+            return None
+        shares, values = self._course(taken)
+        missing = (values[:, idle] + self._offset[idle] + ROUNDING).min(axis=1)
+        if missing[0] < 0.0:
+            return 0.0
+        nearest = self._dips(taken, shares, missing, idle)
+        if nearest is None:
+            return None
+
+        def left(share: float) -> float:
+            return float((self._openings(self._at(taken, share))[idle] + ROUNDING).min())
+
+        low = 0.0
+        for high in (*nearest, *shares[shares > nearest[-1]].tolist()):
+            if left(high) < 0.0:
+                return _root(left, low, high, XTOL) if left(low) > 0.0 else low
+            low = high
+        return None
+
+    def _dips(self, taken: Taken, shares: Array, missing: Array, idle: Array) -> list[float] | None:
+        """Shares of a step between which the first row closes, as interpolated; the begin is left out."""
+        for k in range(1, len(shares)):
+            if missing[k] < 0.0:
+                return [*([shares[k - 1]] if k > 1 else []), shares[k]]
+            if k < len(shares) - 1 and missing[k] < missing[k - 1] and missing[k] <= missing[k + 1]:
+                # Between three of them the parabola through them says where it is least.
+                a, b = missing[k - 1] - missing[k], missing[k + 1] - missing[k]
+                at = float(shares[k] + 0.5 * (a - b) / max(a + b, 1e-300) * (shares[k + 1] - shares[k]))
+                lowest = self._interpolated(taken, at)[idle] + self._offset[idle] + ROUNDING
+                if lowest.min() < 0.0:
+                    return [shares[k - 1], at] if k > 1 else [at]
+        return None
+
+    def _course(self, taken: Taken) -> tuple[Array, Array]:
+        """Shares of a step (n,), evenly spaced, and the interpolated openings (n, rows) there."""
+        shares = np.linspace(0.0, 1.0, LOOKS + 1)
+        found = [self._interpolated(taken, share) for share in shares[:-1].tolist()]
+        return shares, np.array([*found, self._opened(taken.after.q, taken.after.y, taken.after.t, taken.after)])
+
+    def _interpolated(self, taken: Taken, share: float) -> Array:
+        """The openings (rows,) at a share of a step, by the polynomial through its stages."""
+        begin, last = taken.begin, taken.begin.last
+        nodes = np.array([0.0, *taken.places])
+        turns = np.concatenate([np.zeros((1, *taken.turns.shape[1:])), taken.turns])
+        shifts = np.concatenate([np.zeros((1, taken.shifts.shape[1])), taken.shifts])
+        if len(taken.places) == 1 and last is not None:
+            # One stage alone makes a line.
+            nodes = np.array([-last.h / taken.h, *nodes])
+            turns = np.concatenate([-last.turns[-1:], turns])
+            shifts = np.concatenate([-last.shifts[-1:], shifts])
+        row = evaluation(nodes, np.array([share]))[0]
+        q = turned_by(begin.q, np.einsum("n,nra->ra", row, turns))
+        return self._opened(q, begin.y + row @ shifts, begin.t + share * taken.h, begin)
+
+    def _released(self, taken: Taken) -> float | None:
+        """Share of a step after which the first row ceases to act; None where none does."""
+        begin, h = taken.begin, taken.h
+        acting = begin.acting > 0.0
+        if not acting.any():
+            return None
+        at_stages = (self.signs * taken.lam[:, self.rows])[:, acting]
+        before = (self.signs * begin.lam[self.rows])[acting]
+        # Forces of stages are not as accurate as what decides: it is asked for also where they only come near to zero.
+        doubtful = [
+            float(place)
+            for place, forces in zip(taken.places, at_stages, strict=True)
+            if (forces < 0.0).any() or (place == 1.0 and (2.0 * forces < before).any())
+        ]
+
+        def left(share: float) -> float:
+            return self._least(self._at(taken, share), h)
+
+        for share in doubtful:
+            if left(share) < 0.0:
+                return _root(left, 0.0, share, RELEASED) if left(0.0) > 0.0 else 0.0
+        return None
+
+    def _least(self, memory: Memory, h: float) -> float:
+        """The least force of a row that acts, over that which is rounding."""
+        forces, _, rounding = self._forces(self._consistent(memory), self._length(h))
+        return float(forces[memory.acting > 0.0].min()) + rounding
+
+    # -- states ---------------------------------------------------------------------------------------
+
+    def _after(self, memory: Memory, closes: Array, ceases: Array, h: float) -> Memory:
+        """The state after an event at which rows close or cease to act, both (rows,) of bool."""
+        before = memory.acting > 0.0
+        collision = self._impacts.at(memory)
+        speed = collision.speed(before, closes)
+        ebbed = speed > 0.0 and self._ebbs(memory.t, speed)
+        held, hit = (before | closes, closes & False) if ebbed else (before, closes)
+        velocity, impulses, touching, lost = collision.solved(held, hit)
+        there = replace(memory, rates=_with_velocity(memory.rates, velocity), last=None, lost=memory.lost + lost)
+        acting, lam = self._settled(there, touching & ~ceases, touching, h)
+        there = replace(there, acting=acting.astype(float), lam=lam)
+        self._offset = np.where(acting, 0.0, np.maximum(-self._opened(there.q, there.y, there.t, there), 0.0))
+        hardest = int(np.argmax(impulses))
+        for i in np.flatnonzero((acting != before) | (impulses > 0.0)).tolist():
+            own = lost if i == hardest else 0.0
+            self.found.append(Event(memory.t, i, bool(acting[i]), float(impulses[i]), own))
+        return there
+
+    def _settled(self, memory: Memory, acting: Array, touching: Array, h: float) -> tuple[Array, Array]:
+        """Which of the rows that touch act from now on, (rows,) of bool, and all multipliers."""
+        if not touching.any():
+            return acting, np.zeros(len(memory.lam))
+        h = self._length(h)
+        while h > SHORTEST:
+            tried: set[bytes] = set()
+            now = acting
+            while now.tobytes() not in tried:
+                tried.add(now.tobytes())
+                found, lam = self._tried(memory, now, touching, h)
+                if lam is not None:
+                    return now, lam
+                now = found
+            # What goes from one choice to the next may go round: where there are few all are tried.
+            for choice in _choices(touching):
+                if choice.tobytes() not in tried and (lam := self._tried(memory, choice, touching, h)[1]) is not None:
+                    return choice, lam
+            # Waves that are shorter than the step make what is true at once untrue a little later.
+            h *= SHORTER
+        seconds = memory.t * self.stepper.time
+        names = ", ".join(np.array(self.system.one_sided.names)[touching].tolist())
+        raise SolveError(Status.STOPPED, f"at {seconds:.9g} s no choice of what acts holds, of {names}", memory)
+
+    def _tried(self, memory: Memory, acting: Array, touching: Array, h: float) -> tuple[Array, Array | None]:
+        """Multipliers where a choice of rows that act holds, else None, and the next choice that may."""
+        forces, opened, rounding = self._forces(replace(memory, acting=acting.astype(float)), h)
+        forces, opened = np.where(acting, forces, np.inf), np.where(touching & ~acting, opened, np.inf)
+        pulled, passed = int(np.argmin(forces)), int(np.argmin(opened))
+        if forces[pulled] < -rounding:
+            return acting & (np.arange(len(acting)) != pulled), None
+        if opened[passed] < -ROUNDING:
+            return acting | (np.arange(len(acting)) == passed), None
+        lam = np.zeros(len(memory.lam))
+        lam[self.rows] = self.signs * np.where(acting, forces, 0.0)
+        return acting, lam
+
+    def _consistent(self, memory: Memory) -> Memory:
+        """The state with the nearest velocities that all acting rows allow."""
+        acting = memory.acting > 0.0
+        velocity, *_ = self._impacts.at(memory).solved(acting, np.zeros(len(acting), bool))
+        return replace(memory, rates=_with_velocity(memory.rates, velocity), last=None)
+
+    @staticmethod
+    def _length(h: float) -> float:
+        """Length of a short step where steps have the length h."""
+        return min(h, max(SHARE * h, LEAST))
+
+    def _forces(self, memory: Memory, h: float) -> tuple[Array, Array, float]:
+        """Forces of the rows (rows,) just after a state, openings at the end of a short step, and what is rounding."""
+        short = self.stepper.starter
+        taken = short.step(replace(memory, last=None, rates=memory.rates[: short.method.kept]), h)
+        if not taken.converged:
+            seconds = memory.t * self.stepper.time
+            raise SolveError(Status.STOPPED, f"Newton's method did not converge at {seconds:.6g} s", memory)
+        forces = self.signs * (evaluation(taken.places, np.zeros(1))[0] @ taken.lam)[self.rows]
+        most = float(np.abs(forces * memory.acting).max(initial=0.0))
+        rounding = float(np.finfo(float).eps) * ROUNDED / h**2 + RELATIVE * most
+        return forces, self._openings(taken.after), rounding
+
+    def _openings(self, memory: Memory) -> Array:
+        return self._opened(memory.q, memory.y, memory.t, memory) + self._offset
+
+    def _opened(self, q: Array, y: Array, t: float, near: Memory) -> Array:
+        """The openings (rows,) at a state; angles that count turns are those near a state."""
+        return self.system.openings(State(q, y, near.lam, near.unwrapped), t)
+
+
+def _root(function: Callable[[float], float], low: float, high: float, width: float) -> float:
+    """Where a function changes its sign."""
+    from scipy.optimize import brentq
+
+    return float(brentq(function, low, high, xtol=width))
+
+
+def _choices(touching: Array) -> Iterator[Array]:
+    """All choices of rows that touch, those of most rows first; none where there are too many rows."""
+    rows = np.flatnonzero(touching)
+    for count in range(len(rows), -1, -1) if len(rows) <= FEW else ():
+        for chosen in itertools.combinations(rows.tolist(), count):
+            yield np.isin(np.arange(len(touching)), chosen)
+
+
+def _with_velocity(rates: Array, velocity: Array) -> Array:
+    return np.vstack([velocity[None, :], rates[1:]])
+
+
+MOST, BRIEF = 200, 1e-3
+"""Events that are too many within this share of the motion."""
+
+FEW = 5
+"""Rows that touch at one time of which all choices are tried."""
+
+REPEATED, EBBED = 4, 1e-8
+"""Impacts, each weaker and sooner than the one before, and the way between them, unit of length or rad, at which
+they are over.
+"""
+
+PARTS = 4
+"""Steps of a method with one stage up to an event."""
+
+LOOKS = 8
+"""Parts of a step at whose ends openings are looked at."""
+
+ROUNDING = 1e-12
+"""Of openings, unit of length or rad."""
+
+TOGETHER = 1e-9
+"""Opening, unit of length or rad, up to which a row closes at the same time as another one."""
+
+XTOL, RELEASED = 1e-13, 1e-7
+"""Shares of a step to which an impact is located, and a release: the force being near zero, that errs by their cube."""
+
+SHARE, LEAST, SHORTER = 0.05, 3e-4, 0.2
+"""Share of a step in which forces are found, its least length, dimensionless, for the sake of rounding, and by what it
+is shorter where they tell nothing.
+"""
+
+ROUNDED, RELATIVE = 10.0, 1e-9
+"""Forces that are rounding: rounding of places over the square of the step, and the share of the largest force."""

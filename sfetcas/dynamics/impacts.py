@@ -1,0 +1,161 @@
+"""Impacts: the velocities after impulses along rows that act on one side only, at one instant.
+
+Velocities ``w`` of the unknowns change by impulses ``p`` along the rows ``H`` that act or close, so that none closes
+further,
+
+    M (w+ - w) = H^T p,      p >= 0,      H w+ >= 0,      p . H w+ = 0,
+
+without rebound; rows ``G`` of all other constraints hold before and after, with impulses of either sign.  It is the
+velocity nearest to ``w`` in the metric of the masses ``M`` that all rows allow (Gauss's principle of least constraint),
+and what is lost is ``1/2 (w - w+).M (w - w+)``, never below zero.  Where several rows act the impulses are those of a
+least-squares problem with bounds.
+
+Source: Moreau, Unilateral contact and dry friction in finite freedom dynamics, in: Nonsmooth Mechanics and
+Applications, CISM 302 (1988); Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import casadi as ca
+import numpy as np
+
+from ..mathematics.arrays import Array, Index
+from ..mechanics.equations import State
+from .integrating import Memory
+from .stages import StageEquations
+
+__all__ = ["Collision", "Impacts"]
+
+
+class Impacts:
+    """Masses and rows of a system with one-sided rows, at any state."""
+
+    def __init__(self, system: StageEquations) -> None:
+        self.system = system
+
+    def at(self, memory: Memory) -> Collision:
+        """What an impact at a state would do."""
+        return Collision(self, memory)
+
+    @functools.cached_property
+    def momenta(self) -> ca.Function:
+        """(q, y, factors, unwrapped, v) -> Jacobian of the rows, masses of the unknowns, and their momenta.
+
+        The momenta are those of velocities v of the quantities.
+        """
+        system, n = self.system, self.system.layout
+        q, y, v = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("v", n.x)
+        factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
+        nothing = ca.MX.zeros(n.lam)
+        still, forces = ca.MX.zeros(n.x, 1), system.forces(ca.MX.zeros(n.x, 1), v)
+        moving, resting = (system.stage(q, y, nothing, part, factors, unwrapped) for part in (forces, still))
+        unknowns = system.equations.unknowns
+        rows = system.static_matrix(resting)[unknowns:, :unknowns]
+        mass = system.coupling_matrix(resting, 0.0, 1.0)[:unknowns, :unknowns]
+        found = [rows, mass, (moving.residual - resting.residual)[:unknowns]]
+        return ca.Function("momenta", [q, y, factors, unwrapped, v], found)
+
+
+class Collision:
+    """Masses and rows at a state, and the velocities after impulses along the rows."""
+
+    def __init__(self, impacts: Impacts, memory: Memory) -> None:
+        system, unit = impacts.system, impacts.system.masses.time
+        self._system, self._rows, self._signs = system, system.one_sided.rows, system.one_sided.signs
+        self._state = State(memory.q, memory.y, memory.lam, memory.unwrapped)
+        self._factors = system.factors(memory.t)
+        rates = [0.0 if history is None else history.rate(memory.t * unit) for history in system.histories]
+        self._faster = np.array(rates) * unit
+        still = np.zeros(system.equations.unknowns)
+        _, drift, _, self._opening = system.rates_in_time(self._state, self._factors, still, self._faster)
+        given = self._state.q.T, memory.y, self._factors, system.counted(self._state)
+        rows, mass, momentum = (np.array(part) for part in impacts.momenta(*given, memory.rates[0] - drift))
+        # In units in which each unknown has the mass one, but where it has next to none.
+        diagonal = np.abs(np.diag(mass))
+        self._unit = 1.0 / np.sqrt(np.maximum(diagonal, LIGHT * diagonal.max(initial=TINY)))
+        self._jacobian, self._momentum = rows * self._unit, momentum.ravel() * self._unit
+        self._mass = mass * self._unit * self._unit[:, None] + MASSLESS * np.eye(len(mass))
+
+    @functools.cached_property
+    def _always(self) -> Index:
+        """The rows that are on no side."""
+        return np.setdiff1d(np.arange(len(self._jacobian)), self._rows)
+
+    def _allowed(self, before: Array) -> Array:
+        """The nearest velocities (unknowns,) under which no row opens or closes that acts."""
+        held = np.concatenate([self._always, self._rows[before]])
+        return self._onto(held, self._momentum[:, None], -self._opening[held])[:, 0]
+
+    def speed(self, before: Array, closes: Array) -> float:
+        """The largest speed with which a row closes; arguments as of :meth:`solved`."""
+        if not closes.any():
+            return 0.0
+        rows = self._rows[closes]
+        return float((self._signs[closes] * (self._jacobian[rows] @ self._allowed(before) + self._opening[rows])).max())
+
+    def solved(self, before: Array, closes: Array) -> tuple[Array, Array, Array, float]:
+        """Velocities (quantities,) after the event, impulses, which rows touch then, and the energy that is lost.
+
+        ``before`` and ``closes`` are the rows that act and those that close, (rows,) of bool.
+        """
+        always = self._always
+        w = self._allowed(before)
+        impulses, taking, lost = np.zeros(len(before)), np.flatnonzero(before | closes), 0.0
+        touching = before.copy()
+        if closes.any():
+            chosen = self._signs[taking, None] * self._jacobian[self._rows[taking]]
+            speed = chosen @ w + self._signs[taking] * self._opening[self._rows[taking]]
+            # Rows that act do not move, and what moves so slowly is rounding.
+            speed[before[taking] | (np.abs(speed) < SLOW)] = 0.0
+            back = self._onto(always, chosen.T, np.zeros(len(always)))
+            found = _complementary(chosen @ back, speed)
+            w = w - back @ found
+            left = speed - chosen @ back @ found
+            impulses[taking] = found
+            touching[taking] = (found > 0.0) | (left > -SLOW * max(1.0, float(np.abs(speed).max())))
+            lost = 0.5 * float(found @ chosen @ back @ found)
+        _, velocity, _, _ = self._system.rates_in_time(self._state, self._factors, w * self._unit, self._faster)
+        return velocity, impulses, touching, lost
+
+    def _onto(self, rows: Index, momenta: Array, opening: Array) -> Array:
+        """Velocities (unknowns, n) for momenta (unknowns, n) under which rows open at given rates (rows,)."""
+        from scipy.linalg import lu_factor, lu_solve
+
+        held = self._jacobian[rows]
+        size = np.maximum(np.linalg.norm(held, axis=1), TINY)
+        held, n = held / size[:, None], len(self._mass)
+        right = np.vstack([momenta, np.repeat((opening / size)[:, None], momenta.shape[1], axis=1)])
+        matrix = np.block([[self._mass, held.T], [held, np.zeros((len(rows),) * 2)]])
+        # Rows that depend on each other leave multipliers open: a small diagonal, which is then taken out again.
+        regular = matrix - np.diag(np.repeat([0.0, DUAL], [n, len(rows)]))
+        factors = lu_factor(regular)
+        found = lu_solve(factors, right)
+        for _ in range(REFINED):
+            found += lu_solve(factors, right - matrix @ found)
+        return np.asarray(found[:n])
+
+
+def _complementary(yielding: Array, speed: Array) -> Array:
+    """The impulses p (n,), none below zero, with ``speed - yielding p`` not above zero, and zero where p is not.
+
+    ``yielding`` (n, n) is symmetric and has no eigenvalue below zero.
+    """
+    from scipy.optimize import nnls
+
+    values, vectors = np.linalg.eigh(0.5 * (yielding + yielding.T))
+    root = np.sqrt(np.maximum(values, MASSLESS * values.max(initial=TINY)))
+    return np.asarray(nnls(root[:, None] * vectors.T, (vectors.T @ speed) / root)[0])
+
+
+SLOW = 1e-9
+"""Speed of opening, over the largest closing speed or dimensionless, up to which a row stays closed in an impact."""
+
+LIGHT, MASSLESS, TINY = 1e-6, 1e-12, 1e-300
+"""Share of the largest mass below which an unknown keeps it in its unit, and of a unit that counts as no mass; and what
+is divided by instead of zero.
+"""
+
+DUAL, REFINED = 1e-12, 3
+"""Diagonal of the rows, whose gradients are of length one, and rounds in which what it does is taken out again."""
