@@ -30,6 +30,7 @@ __all__ = [
     "cushioned",
     "cut_members",
     "elongation_of",
+    "pulled_place",
     "spanned",
     "tensions_of",
 ]
@@ -141,6 +142,18 @@ def elongation_of(tendon: str) -> str:
     return f"elongation of tendons.{tendon}"
 
 
+def pulled_place(scene: Scene, mesh: Mesh, tendon: str) -> str:
+    """Name of the place whose first displacement tells how a tendon of given length is pulled; empty where none does.
+
+    It is the elongation of one that stretches, the tension at the pulled end of one that rubs.
+    """
+    record = scene.tendons[tendon]
+    if record.stiffness is not None:
+        return elongation_of(tendon)
+    taut = record.measured and (tendon, "slack") not in mesh.stops
+    return f"tension of tendons.{tendon}" if record.rubs and taut else ""
+
+
 def angle_of(tube: str, number: int) -> str:
     """Name of the place that holds the angle of a tube at a node, counted from 0 at its base."""
     return f"tubes.{tube}, node {number + 1}"
@@ -163,7 +176,7 @@ def tensions_of(scene: Scene, mesh: Mesh, tendon: str) -> tuple[str, ...]:
         ends = zip(inside, inside[1:], strict=False)
         found = [f"tension of tendons.{tendon} in its piece {i + 1}, {a:.12g} to {b:.12g}" for a, b in ends]
         names += found if piece.forwards else found[::-1]
-    return tuple((names if scene.tendons[tendon].pulled_at == "start" else names[::-1])[:-1])
+    return tuple((names[::-1] if scene.tendons[tendon].pulled_at == "end" else names)[:-1])
 
 
 def spanned(scene: Scene, mesh: Mesh, piece: Piece) -> range:
@@ -271,12 +284,11 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
             parts.append(Segment(name, slice(begin + a, begin + b), here, there))
             here = there
         begin += len(cuts) - 1
-    for name, tendon in scene.tendons.items():
-        if tendon.stiffness is not None:
-            places.append(elongation_of(name))
-            retained.add(elongation_of(name))
-        places += tensions_of(scene, mesh, name)
-        retained |= set(tensions_of(scene, mesh, name))
+    for name in scene.tendons:
+        told = [pulled_place(scene, mesh, name)] if pulled_place(scene, mesh, name) else []
+        told += tensions_of(scene, mesh, name)
+        places += told
+        retained |= set(told)
     # Turning axes act upon all that has mass.
     retained |= set(scene.nodes) if scene.rotating is not None else set()
     retained |= set(_sprung(scene, mesh)) | {load.node for load in scene.loads.values() if load.follows and load.node}
