@@ -30,6 +30,7 @@ from .magnetism import magnet_terms
 from .memory import dissipated_along
 from .mesh import Touch
 from .relaxation import carried, relax
+from .segments import pulled_place
 from .singles import fibre_strain
 from .stations import Stations
 from .stretch_laws import least_tangent, strain_by_force, stretch_law_of
@@ -961,11 +962,16 @@ def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:
 
 
 def strained_like(target: Any, y: Array, source: Any, values: Array) -> None:
-    """Set the strains, and angles of tubes, among the unknowns ``y`` of one model to those of another, in place.
+    """Set the strains, angles of tubes and pulls of tendons among the unknowns ``y`` of one model to those of another.
 
-    ``values`` are the displacement unknowns of the other model, of the same members on another mesh.
+    In place; ``values`` are the displacement unknowns of the other model, of the same members on another mesh.
     """
     angles_like(target, y, source, values)
+    for name in target.scene.tendons:
+        there, here = (pulled_place(model.scene, model.mesh, name) for model in (source, target))
+        if here and here == there:
+            one, other = (model.positions.retained[model.segments.place(here)] for model in (source, target))
+            y[other] = values[one]
     if not (target.element.strains and source.element.strains):
         return
     for name, member in target.scene.members.items():

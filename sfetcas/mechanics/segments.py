@@ -74,6 +74,8 @@ class Segments:
         The same of the part of the changes of curvature (0) and of the strains (1) that has relaxed in each branch.
     strained : mapping of str to mapping of int to str
         Components that are unknown at each of these places, which are the last ones, with their names.
+    pulled : int
+        Number of places before these that tell tensions and elongations of tendons.
     angles : mapping of str to ndarray (elements, nodes)
         For each tube, and each element along which it lies, numbers of the places whose first components are the angles
         by which it is twisted against the section at the nodes, since its base; of a base that is held the ground.
@@ -87,6 +89,7 @@ class Segments:
     strains: Index
     relaxing: Index
     strained: Mapping[str, Mapping[int, str]]
+    pulled: int
     angles: Mapping[str, Index]
 
     def alike(self, other: Segments) -> bool:
@@ -96,8 +99,13 @@ class Segments:
 
     @property
     def without_position(self) -> Index:
-        """Numbers of the places that hold strains."""
-        return np.arange(len(self.places) - len(self.strained), len(self.places))
+        """Numbers of the places that hold strains, or what tells of tendons."""
+        return np.arange(len(self.places) - len(self.strained) - self.pulled, len(self.places))
+
+    @property
+    def of_tendons(self) -> Index:
+        """Numbers of the places that hold what tells of tendons."""
+        return self.without_position[: self.pulled]
 
     @property
     def first(self) -> Index:
@@ -284,11 +292,12 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
             parts.append(Segment(name, slice(begin + a, begin + b), here, there))
             here = there
         begin += len(cuts) - 1
+    told: list[str] = []
     for name in scene.tendons:
-        told = [pulled_place(scene, mesh, name)] if pulled_place(scene, mesh, name) else []
+        told += [pulled_place(scene, mesh, name)] if pulled_place(scene, mesh, name) else []
         told += tensions_of(scene, mesh, name)
-        places += told
-        retained |= set(told)
+    places += told
+    retained |= set(told)
     # Turning axes act upon all that has mass.
     retained |= set(scene.nodes) if scene.rotating is not None else set()
     retained |= set(_sprung(scene, mesh)) | {load.node for load in scene.loads.values() if load.follows and load.node}
@@ -307,6 +316,7 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
         strains,
         relaxing,
         strained,
+        len(told),
         angles,
     )
 
