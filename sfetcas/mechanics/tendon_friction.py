@@ -536,9 +536,11 @@ def settle(model: Any, q: Array, y: Array) -> None:
         q[-1] = 0.0
     for _, _, group, i in sorted(known, key=lambda part: part[:2]):
         if group.places.shape[1] and not getattr(group.kind, "last", True):
-            behind, sides = group.places[i, -1], (q[group.turns[i]].T, places[group.places[i]].T)
-            missing = rotation_forces(group.kind)(*sides, values_of(group.data)[i], 0.0, [])[1]
-            places[behind] -= missing.full().ravel()[-model.element.axes :]
+            # After it comes what pulls, where that is a place.
+            after, axes = int(getattr(group.kind, "given", False)), model.element.axes
+            behind, sides = group.places[i, -1 - after], (q[group.turns[i]].T, places[group.places[i]].T)
+            missing = rotation_forces(group.kind)(*sides, values_of(group.data)[i], 0.0, [])[1].full().ravel()
+            places[behind] -= missing[len(missing) - axes * (1 + after) :][:axes]
             y[retained[behind]] = places[behind]
 
 
