@@ -77,6 +77,18 @@ def test_the_tension_is_found(how, dimension, solver):
     assert step.certificate.stable == "not defined"
 
 
+def test_around_a_rod():
+    """A coil in space: with the length that a tension gives that tension comes back, on the same elements."""
+    way = [{"member": "m", "helix": {"radius": 0.05, "turns": 0.5, "phase": 0.3}}]
+    given = sfetcas.solve(rod(way, tension=T, friction=MU), element="SFET3", elements=2).last
+    rest, told = given.fields.balance.rest_length("t"), given.tendon("t")
+    scene = rod(way, pull=rest - told["length"], friction=MU, pushes=True)
+    found = sfetcas.solve(scene, element="SFET3", elements=2).last
+    for key in ("tension", "far_tension"):
+        assert found.tendon("t")[key] == pytest.approx(told[key], rel=1e-9)
+    np.testing.assert_allclose(found.position("B"), given.position("B"), atol=1e-11)
+
+
 def test_work_is_stored_or_lost():
     """Work of the pull over a path from nothing, by eight Gauss points, which are exact to rounding for it.
 
