@@ -154,6 +154,16 @@ def test_a_rod_that_is_pushed():
     assert told["released"]
 
 
+def test_no_pull_is_none_that_lets_out():
+    """Nor is rounding: what else pulls on the tendon finds it pulled."""
+    for none in ({"pull": 0.0}, {"pull": -1e-15}, {"length": 1.0}, {"length": 1.0 + 1e-15}):
+        scene = rod(dimension="plane", pushes=True, friction=MU, **none)
+        scene = scene.replace({"loads": {"f": {"type": "force", "node": "B", "value": [0, -1]}}})
+        told = sfetcas.solve(scene).last.tendon("t")
+        assert told["released"] is False
+        assert told["tension"] > told["far_tension"] > 0.0
+
+
 def test_slack():
     """Let out too far it has no tension, in a sweep over a load without a gap of answers where it becomes slack."""
     for more in ({}, {"stiffness": K}):

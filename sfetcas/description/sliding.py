@@ -31,17 +31,16 @@ def shortening_of(tendon: Tendon, pieces: Sequence[Piece], lines: Mapping[str, C
     """
     if not tendon.measured:
         return None
-    if tendon.length is None:
-        return float(values_of(tendon.pull or 0.0))
     lengths: list[Any] = []
     for piece in pieces:
         if isinstance(piece, tuple):
             lengths.append(np.linalg.norm(values_of(piece[1].position) - values_of(piece[0].position)))
         else:
             lengths.append(length_of_piece(piece, lines[piece.member]))
-    rest, length = float(values_of(sum(lengths))), float(values_of(tendon.length))
+    rest = float(values_of(sum(lengths)))
+    by = float(values_of(tendon.pull or 0.0)) if tendon.length is None else rest - float(values_of(tendon.length))
     # What is told to be as long as it is.
-    return 0.0 if abs(rest - length) <= tolerances.WRITTEN * rest else rest - length
+    return 0.0 if abs(by) <= tolerances.WRITTEN * rest else by
 
 
 def let_out_at(
