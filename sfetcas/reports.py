@@ -250,10 +250,10 @@ def _report_step(step: Equilibrium, place: str, said: set[str]) -> None:
         print(f"  spring {name}: {', '.join(texts)}")
     for name in step.model.scene.tendons:
         state = step.tendon(name)
-        texts = (
-            f"{key} {_number(state[key], sizes[unit])} {unit}" for key, unit in (("tension", "N"), ("length", "m"))
-        )
-        print(f"  tendon {name}: {', '.join(texts)}{', slack' if state.get('slack') else ''}")
+        asked = (("tension", "N"), ("far_tension", "N"), ("length", "m"))
+        told = [f"{key} {_number(state[key], sizes[unit])} {unit}" for key, unit in asked if key in state]
+        told += [key for key in ("slack", "released") if state.get(key)]
+        print(f"  tendon {name}: {', '.join(told)}")
     for name in step.model.scene.tubes:
         state = step.tube(name)
         texts = (

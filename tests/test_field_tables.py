@@ -5,9 +5,11 @@ import re
 
 import numpy as np
 import pytest
+from test_codegen import built, needs_compiler, said
 
 import sfetcas
 from sfetcas import Scene, SceneError, SolveError
+from sfetcas.solvers.globalised import Code
 
 
 def cubic(x):
@@ -94,6 +96,31 @@ def test_analyses():
         np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-9)
 
 
+@needs_compiler
+def test_exported_code(tmp_path):
+    """The program in C agrees with the process of the same functions, and with statics."""
+    scene, arguments = strip(given(high=0.2), accuracy=1e-3, steps=[0.05]), ["factor"]
+    made = sfetcas.export(scene, tmp_path / "c", name="c", arguments=arguments, results=["nodes.B.position"])
+    outcome, found = made.solve([0.05])
+    assert outcome.code is Code.SOLVED
+    # The accuracy of both meshes.
+    np.testing.assert_allclose(found, sfetcas.solve(scene).last.position("B"), atol=2e-3)
+    words = said(built(tmp_path / "c", "c"))
+    assert re.match(r"(\d+) of \1 cases agree, \1 of them to the last bit", words), words
+    # Where a magnet leaves the table there is no number.
+    outcome, found = made.solve([1.0])
+    assert outcome.code is Code.NOT_FINITE
+    assert np.isnan(found).all()
+
+
+@needs_compiler
+def test_exported_steps(tmp_path):
+    """Time steps in C are those of the process."""
+    moving = strip(given(), accuracy=1e-3, type="dynamic", end=1.0, step=0.01)
+    sfetcas.export(moving, tmp_path / "motion", name="motion")
+    assert "10 of 10 steps agree, 10 of them to the last bit" in said(built(tmp_path / "motion", "motion"))
+
+
 LEAVING = given(high=0.2)
 """A table that ends where the strip comes to under a part of its loads."""
 
@@ -156,7 +183,7 @@ def test_functions_without_a_value(function):
 
 
 def test_what_does_not_know_tables(tmp_path):
-    with pytest.raises(SceneError, match=r"fields\.f: found a table, whose splines are not written in C"):
-        sfetcas.export(strip(given()), tmp_path / "c", name="c")
+    with pytest.raises(SceneError, match=r"fields\.f: found a table, beyond whose end derivatives would go on"):
+        sfetcas.export(strip(given()), tmp_path / "c", name="c", derivatives=True)
     with pytest.raises(SceneError, match=r"fields\.f: found a table, with which no design knows where it ends"):
         sfetcas.find(strip(given()), {"factor": (0.1, 2.0)}, {"nodes.B.position.y": -0.08})

@@ -337,9 +337,9 @@ def test_exported_code(tmp_path):
 @pytest.mark.parametrize(
     ("pull", "words"),
     [
-        ({"pull": 0.01}, "tendons.t.friction: found with a pull, accepted: with a tension"),
         ({"pressure": 1.0, "area": 1.0}, "tendons.t.friction: found with a pressure"),
-        ({"stiffness": 1.0}, "tendons.t.friction: found without a tension"),
+        ({"stiffness": 1.0}, "tendons.t.friction: found without a pull, accepted: with a tension, a pull or a length"),
+        ({"tension": 1.0, "friction": None, "pulled_at": "end"}, "tendons.t.pulled_at: found without a friction"),
         ({"tension": 1.0, "pulled_at": "tip"}, "tendons.t.pulled_at: found 'tip', accepted"),
         ({"tension": 1.0, "friction": -0.1}, "tendons.t.friction: found -0.1, accepted: zero or a number above zero"),
     ],

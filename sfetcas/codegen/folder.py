@@ -123,10 +123,6 @@ def _made(
     derivatives: bool,
 ) -> tuple[EquilibriumSolver | TimeStep | Derivatives, dict[str, str]]:
     """The object that is exported, and the texts of its files by name."""
-    for key, field in scene.fields.items():
-        if field.table is not None and scene.magnets:
-            message = "found a table, whose splines are not written in C, accepted: another type of field"
-            raise SceneError(message, ("fields", key))
     made: EquilibriumSolver | TimeStep | Derivatives
     given: dict[str, Any] = {"arguments": arguments, "settings": settings}
     writer: Writer
@@ -136,6 +132,10 @@ def _made(
     if derivatives:
         if results or places or sensitivities:
             raise SceneError("found results, accepted: none, as a program has unknowns", ("derivatives",))
+        for key, field in scene.fields.items():
+            if field.table is not None and scene.magnets:
+                message = "found a table, beyond whose end derivatives would go on, accepted: another type of field"
+                raise SceneError(message, ("fields", key))
         made = program_of(scene, name, **given)
         writer = DerivativesWriter(made)
     elif moving:

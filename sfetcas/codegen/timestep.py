@@ -190,7 +190,7 @@ def time_step(
     rates[0] = begun.v
     state = begun.state
     memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.unwrapped)
-    if method.kept > 1:
+    if method.kept > 1 or base.segments.pulled:
         step = scene.analysis.step or scene.analysis.duration / 1000.0
         memory = Stepper(own, method).refreshed(memory, step / own.masses.time)
     stages, layout = method.stages, system.layout

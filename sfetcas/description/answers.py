@@ -157,9 +157,9 @@ springs.NAME.stop | N m, N | | statics | of one with a stop: what that adds; zer
 tendons.NAME.tension | N | | all | below zero where it pushes, as a chamber
 tendons.NAME.length | m | | all | along its way
 tendons.NAME.slack | | | statics, motion | of one that does not push, with a length or stiffness
-tendons.NAME.far_tension | N | | all | of one with friction, at the end that is not pulled
+tendons.NAME.far_tension | N | | all | of one with `friction`, at the end that is not pulled
 tendons.NAME.tensions | N | | statics, motion | the same behind each piece of its way, a list from the pulled end on
-tendons.NAME.released | | | statics, motion | of one with friction: whether it is let out instead of pulled
+tendons.NAME.released | | | statics, motion | of one with `friction`: whether it is let out instead of pulled
 tubes.NAME.torque | N m | | statics, motion, parameters | about the tangent, of what turns its base on the tube
 tubes.NAME.angle | rad | | all | of its front end against the section there, counting turns
 tubes.NAME.energy | J | | statics, motion, parameters | strain energy of the tube along its members and behind them
@@ -219,9 +219,9 @@ APPLIES: dict[str, Callable[[Any, Any], bool]] = {
     "springs.NAME.force": lambda scene, spring: spring.type == "translational",
     "springs.NAME.stop": lambda scene, spring: spring.stop is not None,
     "tendons.NAME.slack": lambda scene, tendon: tendon.measured and not tendon.pushes,
-    "tendons.NAME.far_tension": lambda scene, tendon: tendon.rubs,
-    "tendons.NAME.tensions": lambda scene, tendon: tendon.rubs,
-    "tendons.NAME.released": lambda scene, tendon: tendon.rubs,
+    "tendons.NAME.far_tension": lambda scene, tendon: tendon.friction is not None,
+    "tendons.NAME.tensions": lambda scene, tendon: tendon.friction is not None,
+    "tendons.NAME.released": lambda scene, tendon: tendon.friction is not None,
     "motions.NAME.moment": lambda scene, motion: motion.rotation is not None,
     "motions.NAME.force": lambda scene, motion: motion.displacement is not None,
     "stiffness.NAME": lambda scene, node: node.support == "free",

@@ -40,7 +40,7 @@ from .remembering import check_memory, refuse_memory, remembering_section
 from .sections import CrossSection
 from .shapes import CenterLine, place
 from .showing import named, number_in_words, shown
-from .sliding import check_sliding, let_out, let_out_at
+from .sliding import check_sliding, let_out, let_out_at, shortening_of
 from .springs import Spring
 from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
@@ -296,17 +296,23 @@ class Scene(Record):
         return any(self.released_at_steps())
 
     @cached_property
-    def released(self) -> frozenset[str]:
-        """Names of the tendons with friction that are let out: on a path downwards, and where a motion does so."""
+    def shortenings(self) -> Mapping[str, float | None]:
+        """By how much the tendons with friction are shorter at factor 1, m; None where their force is given."""
         rubbing = {name: tendon for name, tendon in self.tendons.items() if tendon.rubs}
-        return frozenset(n for n, tendon in rubbing.items() if let_out(tendon, self.analysis, self.histories))
+        found = {n: shortening_of(t, self.tendon_pieces[n], self.center_lines) for n, t in rubbing.items()}
+        return MappingProxyType(found)
+
+    @cached_property
+    def released(self) -> frozenset[str]:
+        """Names of the tendons with friction that are let out in a path or a motion, and at the first of steps."""
+        given = self.analysis, self.histories
+        return frozenset(n for n, by in self.shortenings.items() if let_out(self.tendons[n], by, *given))
 
     def released_at_steps(self) -> tuple[frozenset[str], ...]:
         """Names of the tendons with friction that are let out at each load factor of ``analysis.steps``."""
         steps, found = self.analysis.steps, dict[str, tuple[bool, ...]]()
-        for name, tendon in self.tendons.items():
-            if tendon.rubs and self.analysis.type == "static":
-                found[name] = let_out_at(tendon, steps, self.histories)
+        for name, by in self.shortenings.items() if self.analysis.type == "static" else ():
+            found[name] = let_out_at(self.tendons[name], by, steps, self.histories)
         return tuple(frozenset(name for name, out in found.items() if out[i]) for i in range(len(steps)))
 
     @cached_property
@@ -502,7 +508,7 @@ def _check_tendons(scene: Scene) -> None:
         except SceneError as error:
             raise error.within("tendons", name) from None
         if tendon.rubs:
-            check_sliding(name, tendon, scene.analysis, scene.histories)
+            check_sliding(name, tendon, scene.shortenings[name], scene.analysis, scene.histories)
         for way in tendon.way:
             section = None if way.member is None else scene.members[way.member].section
             law = None if section is None else scene.sections[section].law

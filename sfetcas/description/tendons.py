@@ -32,6 +32,7 @@ __all__ = [
     "check_pieces",
     "check_way",
     "kinks_along",
+    "length_of_piece",
     "offsets",
     "pieces_of",
     "tangent",
@@ -187,10 +188,10 @@ class Tendon(Record):
     history : name
         Name of a history that replaces the load factor of the step, by which tension, pressure or shortening grow.
     friction : 1
-        Coefficient of friction of a tendon of given tension in its guides, zero or above: along its way the tension
-        changes by the exponential of this times the angle by which the way has turned.
+        Coefficient of friction of a tendon in its guides, zero or above: along its way the tension changes by the
+        exponential of this times the angle by which the way has turned.  Default: none.
     pulled_at : text
-        With friction: ``start`` or ``end`` of its way, at which the tension is given.
+        With friction: ``start`` or ``end`` of its way, at which it is pulled.  Default: ``start``.
     """
 
     way: Annotated[tuple[Way, ...], BeforeValidator(_parts)]
@@ -202,8 +203,8 @@ class Tendon(Record):
     stiffness: Positive | None = None
     pushes: bool = False
     history: str | None = None
-    friction: NotNegative = 0.0
-    pulled_at: Literal["start", "end"] = "start"
+    friction: NotNegative | None = None
+    pulled_at: Literal["start", "end"] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Tendon:
@@ -221,15 +222,17 @@ class Tendon(Record):
             for key in ("stiffness", "pushes"):
                 if getattr(self, key):
                     raise SceneError(f"found with a {given[0]}, accepted: with a pull or a length", (key,))
-        if self.rubs and self.tension is None:
-            found = f"found with a {given[0]}" if given else "found without a tension"
-            raise SceneError(f"{found}, accepted: with a tension, which is that at the pulled end", ("friction",))
+        if self.friction is not None and (not given or self.pressure is not None):
+            found = "found with a pressure" if given else "found without a pull"
+            raise SceneError(f"{found}, accepted: with a tension, a pull or a length", ("friction",))
+        if self.pulled_at is not None and self.friction is None:
+            raise SceneError("found without a friction, accepted: with one, of zero too", ("pulled_at",))
         return self
 
     @property
     def rubs(self) -> bool:
         """Whether there is friction in its guides."""
-        return bool(values_of(self.friction) > 0.0)
+        return self.friction is not None and bool(values_of(self.friction) > 0.0)
 
     @property
     def measured(self) -> bool:
@@ -463,3 +466,17 @@ def tangent(way: Way, line: CenterLine, x: Array, middle: Array) -> tuple[Array,
     slope = np.stack([nothing, along[:, 0], along[:, 1]], axis=-1) / line.length
     forward = np.array([1.0, 0.0, 0.0]) + np.cross(line.curvatures(x), arm) + slope
     return numbers(np.einsum("nij,nj->ni", frames, forward)), numbers(np.einsum("nij,nj->ni", frames, arm))
+
+
+def length_of_piece(piece: Stretch, line: CenterLine) -> Any:
+    """Length of a stretch in the undeformed scene, m."""
+    cuts = np.linspace(piece.start, piece.end, PARTS + 1)
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    spans, middle = np.diff(cuts), 0.5 * (cuts[1:] + cuts[:-1])
+    x = (middle[:, None] + 0.5 * spans[:, None] * nodes).ravel()
+    forward, _ = tangent(piece.way, line, x, np.repeat(middle, len(nodes)))
+    return (np.linalg.norm(forward, axis=1) * (0.5 * spans[:, None] * weights).ravel()).sum() * line.length
+
+
+PARTS = 16
+"""Parts of a stretch over which its length is integrated."""

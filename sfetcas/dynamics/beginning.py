@@ -58,7 +58,7 @@ def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
     # What acts later only, or is cut, may be all that makes a scene one in space.
     tables |= {"dimension": scene.resolved_dimension, "analysis": analysis, "expect": ()}
     before = Scene(**{**_given_keys(scene), **tables})
-    out = tuple((name, "released") for name in scene.released)
+    out = tuple((name, "released" if name in scene.released else "pulled") for name in scene.shortenings)
     return (stops.solve_stopped(before, settings) if scene.stopped else statics.solve(before, settings, stops=out)).last
 
 

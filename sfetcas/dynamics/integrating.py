@@ -11,10 +11,11 @@ import numpy as np
 
 from .. import tolerances
 from ..errors import SolveError, Status
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, Index
 from ..mathematics.interpolation import differentiation, evaluation
 from ..mathematics.kernels import Batch
 from ..mechanics.masses import Observables
+from ..mechanics.segments import pulled_place
 from .methods import Method, Radau
 from .stages import StageEquations
 from .steps import LAST_CHANGE, step_function
@@ -159,7 +160,10 @@ class Stepper:
     def __init__(self, system: StageEquations, method: Method) -> None:
         self.system, self.method = system, method
         self.function = step_function(system, method)
-        self.judged = np.concatenate([np.ones(system.linear), *map(_arms, system.masses.observables)])
+        # Tensions are no positions: their rates, which nothing resists, may be those of rounding.
+        positions, axes = np.ones(system.linear), system.axes
+        positions[(axes * system.model.segments.of_tendons[:, None] + np.arange(axes)).ravel()] = 0.0
+        self.judged = np.concatenate([positions, *map(_arms, system.masses.observables)])
         self._batch = Batch(self.function, 1)
         self.time = system.masses.time
         self.count = 0
@@ -237,7 +241,7 @@ class Stepper:
         """The state for a restart: accelerations, where the method keeps them, are those just after the kink."""
         fresh = replace(memory, last=None)
         if self.method.kept == 1:
-            return fresh
+            return self._told(fresh, self.step(fresh, h)) if len(self._pulled) else fresh
         starter = self.starter
         short = starter.step(replace(fresh, rates=memory.rates[:1]), START * h)
         nodes = np.array([0.0, *starter.method.places])
@@ -247,12 +251,30 @@ class Stepper:
         missed = memory.rates[0] * short.h - (slopes @ values)[0]
         second = (slopes @ slopes @ values)[0] + missed * _bend(nodes)
         acceleration = second / short.h**2
-        return replace(fresh, rates=np.stack([memory.rates[0], acceleration, acceleration]))
+        return self._told(replace(fresh, rates=np.stack([memory.rates[0], acceleration, acceleration])), short)
 
     @functools.cached_property
     def starter(self) -> Stepper:
         """What takes a short step from a state without accelerations: the method itself where it keeps none."""
         return self if self.method.kept == 1 else Stepper(self.system, Radau(2))
+
+    @functools.cached_property
+    def _pulled(self) -> Index:
+        """Numbers of the places that tell how tendons of given length are pulled."""
+        model = self.system.model
+        names = [pulled_place(model.scene, model.mesh, tendon) for tendon in model.scene.tendons]
+        return np.array([model.segments.place(name) for name in names if name], dtype=np.intp)
+
+    def _told(self, memory: Memory, taken: Taken) -> Memory:
+        """The state with these as they are just after it: what is pulled at once says nothing of before."""
+        if not len(self._pulled) or not taken.converged:
+            return memory
+        retained, axes = self.system.model.positions.retained[self._pulled], self.system.axes
+        now = memory.y + evaluation(np.asarray(taken.places), np.zeros(1))[0] @ taken.shifts
+        y, x = memory.y.copy(), memory.x.copy()
+        y[retained] = now[retained]
+        x[axes * self._pulled[:, None] + np.arange(axes)] = now[retained]
+        return replace(memory, y=y, x=x)
 
 
 START = 0.05

@@ -242,9 +242,9 @@ class System(Expressions):
         grounded = (
             any((group.places < 0).any() for group in self.model.connections) or self.model.rotating_frame is not None
         )
-        # Strains and angles of tubes are displacements by their numbers alone.
+        # Strains, angles of tubes and tensions are displacements by their numbers alone.
         moving = ~np.isin(positions.Y.row // axes, self.model.segments.without_position)
-        free = self.places - len(self.model.segments.strained)
+        free = self.places - len(self.model.segments.without_position)
         if grounded or moving.sum() != axes * free:
             return None
         y = np.zeros((self.layout.y, axes))

@@ -140,7 +140,8 @@ class Refinement:
     def _placed(source: Solved, prepared: Prepared, loading: Loading) -> State:
         """The state on another mesh, where holes of tendons may need places that it has not."""
         state, segments = transferred(source.model, source.state, prepared.model), prepared.model.segments
-        if not source.model.scene.tendons or segments.retained <= {*source.model.segments.retained, *segments.strained}:
+        told = {*source.model.segments.retained, *(segments.places[i] for i in segments.without_position)}
+        if not source.model.scene.tendons or segments.retained <= told:
             return state
         state = prepared.equations.holding(state, loading)
         return closed(prepared.equations, state, loading, {*source.model.positions.unknowns})

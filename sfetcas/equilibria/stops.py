@@ -23,7 +23,7 @@ from .statics import Settings, solve
 __all__ = ["solve_stopped"]
 
 Stops = tuple[tuple[str, str], ...]
-"""Springs at a stop: name, and low or high; tendons that are slack or let out: name, and slack or released."""
+"""Springs at a stop: name, and low or high; tendons: name, and slack, or released or pulled."""
 
 T = TypeVar("T")
 
@@ -46,7 +46,7 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
     stops: Stops = ()
     for factor, released in zip(scene.analysis.steps, scene.released_at_steps(), strict=True):
         try:
-            out = tuple((name, "released") for name in scene.tendons if name in released)
+            out = tuple((name, "released" if name in released else "pulled") for name in scene.shortenings)
             found, stops = _at_stops(scene, settings, factor, stops, out)
         except SolveError as error:
             raise at_factor(error, scene, factor, steps, seconds) from None
@@ -57,7 +57,7 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
 
 
 def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops, released: Stops) -> tuple[Solution, Stops]:
-    """The answer of one factor with the tendons that are let out, from the stops that the factor before it reached."""
+    """The answer of one factor with the directions of tendons, from the stops that the factor before it reached."""
     alone = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"steps": (factor,)})})
     tried: set[Stops] = set()
     while stops not in tried:

@@ -40,7 +40,9 @@ def functions_in_c(functions: Sequence[ca.Function], prefix: str, roots: Iterabl
     prefix : prefix of all names that CasADi generates
     roots : names of functions called from outside; also of CasADi's runtime, as ``casadi_ldl``
     """
-    head, chunks = _chunks(_written(functions, prefix, {"with_export": False, "casadi_int": "int"}))
+    text = _written(functions, prefix, {"with_export": False, "casadi_int": "int"})
+    # Splines are called by the definition of their name.
+    head, chunks = _chunks(re.sub(r"^(?!#)(.*)CASADI_PREFIX\((\w+)\)\(", r"\1casadi_\2(", text, flags=re.MULTILINE))
     wanted, reached = list(roots), set[str]()
     while wanted:
         name = wanted.pop()

@@ -165,7 +165,7 @@ class _Maker:
     def stops(self, mesh: Mesh) -> Iterator[One]:
         """Springs that stand at a stop."""
         for name, side in mesh.stops:
-            if side in ("slack", "released"):
+            if side in ("slack", "released", "pulled"):
                 continue
             spring, row = self.scene.springs[name], f"springs.{name}.stop"
             assert spring.stop is not None

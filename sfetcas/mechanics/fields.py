@@ -30,10 +30,11 @@ from .magnetism import magnet_terms
 from .memory import dissipated_along
 from .mesh import Touch
 from .relaxation import carried, relax
+from .segments import pulled_place
 from .singles import fibre_strain
 from .stations import Stations
 from .stretch_laws import least_tangent, strain_by_force, stretch_law_of
-from .tendon_friction import settle, turned_since
+from .tendon_friction import is_let_out, settle, turned_since
 from .tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
 from .terms import answers_of, energies_of
 from .tube_fields import fields_of_tube, places_along
@@ -438,19 +439,20 @@ class Fields:
 
     def released(self, name: str) -> bool:
         """Whether a tendon that rubs is let out, so that its tension rises from the pulled end on."""
-        return (name, "released") in self.model.mesh.stops or name in self.model.scene.released
+        return is_let_out(self.model.scene, self.model.mesh, name)
 
     def tendon(self, name: str) -> dict[str, Any]:
         """Tension, N, and length, m, of a tendon, and of one that does not push whether it is slack.
 
-        Of one that rubs also the tension at the end that is not pulled and tensions (pieces,) behind the pieces of its
-        way, N, from the pulled end on, and whether it is let out.
+        Of one with friction also the tension at the end that is not pulled and tensions (pieces,) behind the pieces of
+        its way, N, from the pulled end on, and whether it is let out.
         """
         found: dict[str, Any] = {**self.balance.tendon(name)}
         tendon = self.model.scene.tendons[name]
-        if tendon.rubs:
-            tensions = found.pop("tensions")
-            return {**found, "far_tension": tensions[-1], "tensions": tensions, "released": self.released(name)}
+        if tendon.friction is not None:
+            # Without any it is the same all along.
+            tensions = found.pop("tensions", [found["tension"]] * len(self.model.scene.tendon_pieces[name]))
+            found |= {"far_tension": tensions[-1], "tensions": tensions, "released": self.released(name)}
         if not tendon.measured or tendon.pushes:
             return found
         slack = (name, "slack") in self.model.mesh.stops
@@ -976,11 +978,16 @@ def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:
 
 
 def strained_like(target: Any, y: Array, source: Any, values: Array) -> None:
-    """Set the strains, and angles of tubes, among the unknowns ``y`` of one model to those of another, in place.
+    """Set the strains, angles of tubes and pulls of tendons among the unknowns ``y`` of one model to those of another.
 
-    ``values`` are the displacement unknowns of the other model, of the same members on another mesh.
+    In place; ``values`` are the displacement unknowns of the other model, of the same members on another mesh.
     """
     angles_like(target, y, source, values)
+    for name in target.scene.tendons:
+        there, here = (pulled_place(model.scene, model.mesh, name) for model in (source, target))
+        if here and here == there:
+            one, other = (model.positions.retained[model.segments.place(here)] for model in (source, target))
+            y[other] = values[one]
     if not (target.element.strains and source.element.strains):
         return
     for name, member in target.scene.members.items():

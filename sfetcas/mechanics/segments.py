@@ -30,6 +30,7 @@ __all__ = [
     "cushioned",
     "cut_members",
     "elongation_of",
+    "pulled_place",
     "spanned",
     "tensions_of",
 ]
@@ -73,6 +74,8 @@ class Segments:
         The same of the part of the changes of curvature (0) and of the strains (1) that has relaxed in each branch.
     strained : mapping of str to mapping of int to str
         Components that are unknown at each of these places, which are the last ones, with their names.
+    pulled : int
+        Number of places before these that tell tensions and elongations of tendons.
     angles : mapping of str to ndarray (elements, nodes)
         For each tube, and each element along which it lies, numbers of the places whose first components are the angles
         by which it is twisted against the section at the nodes, since its base; of a base that is held the ground.
@@ -86,6 +89,7 @@ class Segments:
     strains: Index
     relaxing: Index
     strained: Mapping[str, Mapping[int, str]]
+    pulled: int
     angles: Mapping[str, Index]
 
     def alike(self, other: Segments) -> bool:
@@ -95,8 +99,13 @@ class Segments:
 
     @property
     def without_position(self) -> Index:
-        """Numbers of the places that hold strains."""
-        return np.arange(len(self.places) - len(self.strained), len(self.places))
+        """Numbers of the places that hold strains, or what tells of tendons."""
+        return np.arange(len(self.places) - len(self.strained) - self.pulled, len(self.places))
+
+    @property
+    def of_tendons(self) -> Index:
+        """Numbers of the places that hold what tells of tendons."""
+        return self.without_position[: self.pulled]
 
     @property
     def first(self) -> Index:
@@ -141,6 +150,18 @@ def elongation_of(tendon: str) -> str:
     return f"elongation of tendons.{tendon}"
 
 
+def pulled_place(scene: Scene, mesh: Mesh, tendon: str) -> str:
+    """Name of the place whose first displacement tells how a tendon of given length is pulled; empty where none does.
+
+    It is the elongation of one that stretches, the tension at the pulled end of one that rubs.
+    """
+    record = scene.tendons[tendon]
+    if record.stiffness is not None:
+        return elongation_of(tendon)
+    taut = record.measured and (tendon, "slack") not in mesh.stops
+    return f"tension of tendons.{tendon}" if record.rubs and taut else ""
+
+
 def angle_of(tube: str, number: int) -> str:
     """Name of the place that holds the angle of a tube at a node, counted from 0 at its base."""
     return f"tubes.{tube}, node {number + 1}"
@@ -163,7 +184,7 @@ def tensions_of(scene: Scene, mesh: Mesh, tendon: str) -> tuple[str, ...]:
         ends = zip(inside, inside[1:], strict=False)
         found = [f"tension of tendons.{tendon} in its piece {i + 1}, {a:.12g} to {b:.12g}" for a, b in ends]
         names += found if piece.forwards else found[::-1]
-    return tuple((names if scene.tendons[tendon].pulled_at == "start" else names[::-1])[:-1])
+    return tuple((names[::-1] if scene.tendons[tendon].pulled_at == "end" else names)[:-1])
 
 
 def spanned(scene: Scene, mesh: Mesh, piece: Piece) -> range:
@@ -271,12 +292,12 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
             parts.append(Segment(name, slice(begin + a, begin + b), here, there))
             here = there
         begin += len(cuts) - 1
-    for name, tendon in scene.tendons.items():
-        if tendon.stiffness is not None:
-            places.append(elongation_of(name))
-            retained.add(elongation_of(name))
-        places += tensions_of(scene, mesh, name)
-        retained |= set(tensions_of(scene, mesh, name))
+    told: list[str] = []
+    for name in scene.tendons:
+        told += [pulled_place(scene, mesh, name)] if pulled_place(scene, mesh, name) else []
+        told += tensions_of(scene, mesh, name)
+    places += told
+    retained |= set(told)
     # Turning axes act upon all that has mass.
     retained |= set(scene.nodes) if scene.rotating is not None else set()
     retained |= set(_sprung(scene, mesh)) | {load.node for load in scene.loads.values() if load.follows and load.node}
@@ -295,6 +316,7 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
         strains,
         relaxing,
         strained,
+        len(told),
         angles,
     )
 

@@ -26,15 +26,16 @@ from typing import Any, ClassVar, Literal, final
 import casadi as ca
 import numpy as np
 
-from ..description.tendons import Hole, Piece, Stretch, Tendon, tangent
+from ..description.tendons import Hole, Piece, Stretch, Tendon, length_of_piece, tangent
 from ..mathematics.arrays import Array, numbers
 from ..mathematics.quaternion import product
+from .beams import Scales
 from .elements import Element
 from .parts import Parts
 from .segments import elongation_of, spanned
 from .terms import ARGUMENTS, GROUND, One, Side, Term, name_of
 
-__all__ = ["Elongation", "Routed", "Spanned", "Strung", "length_of_piece", "loose_in", "tendons_in"]
+__all__ = ["Elongation", "Routed", "Spanned", "Strung", "loose_in", "pull_of", "tendons_in"]
 
 _Chart = Literal["vectors", "components"]
 """Derivatives by rotations: by vectors about the fixed axes, or by components of quaternions."""
@@ -487,6 +488,13 @@ def loose_in(parts: Parts, name: str) -> Iterator[tuple[Piece, list[One]]]:
             yield piece, [] if scene.members[piece.member].type == "rigid" else list(maker._routed(piece))
 
 
+def pull_of(tendon: Tendon, rest: Any, scales: Scales) -> Any:
+    """Tension, or shortening of one whose length without load is ``rest``, at factor 1, dimensionless."""
+    if not tendon.measured:
+        return tendon.force / scales.force
+    return (tendon.pull or 0.0) / scales.length if tendon.length is None else rest - tendon.length / scales.length
+
+
 @dataclass(frozen=True, eq=False)
 class _Maker:
     parts: Parts
@@ -536,15 +544,9 @@ class _Maker:
 
     def _load(self, i: int, rest: Any, history: str | None) -> dict[str | None, Array]:
         """Tension of each part, or the shortening with the first part alone."""
-        tendon, scales = self.tendon, self.parts.scales
-        if not tendon.measured:
-            return {history: np.reshape(numbers(tendon.force / scales.force), (1,))}
-        if i or not self.given:
+        if self.tendon.measured and (i or not self.given):
             return {}
-        pull = (
-            rest - tendon.length / scales.length if tendon.length is not None else (tendon.pull or 0.0) / scales.length
-        )
-        return {history: np.reshape(numbers(pull), (1,))}
+        return {history: np.reshape(numbers(pull_of(self.tendon, rest, self.parts.scales)), (1,))}
 
     def _strung(self, first: Hole, last: Hole) -> One:
         space, unit, n = self.parts.element.space, self.parts.scales.length, self.axes
@@ -622,17 +624,3 @@ class _Maker:
             data = np.concatenate([forward[i].ravel(), arm[i].ravel(), yielding, rest[i : i + 1], np.zeros(1)])
             turns, places = (tuple(part[number].tolist()) for part in (parts.rotations.turns, parts.segments.strains))
             yield One(kind, self.name, "", numbers(data), turns, places, self._row, element=number)
-
-
-def length_of_piece(piece: Stretch, line: Any) -> Any:
-    """Length of a stretch along a rigid member, m."""
-    cuts = np.linspace(piece.start, piece.end, PARTS + 1)
-    nodes, weights = np.polynomial.legendre.leggauss(8)
-    spans, middle = np.diff(cuts), 0.5 * (cuts[1:] + cuts[:-1])
-    x = (middle[:, None] + 0.5 * spans[:, None] * nodes).ravel()
-    forward, _ = tangent(piece.way, line, x, np.repeat(middle, len(nodes)))
-    return (np.linalg.norm(forward, axis=1) * (0.5 * spans[:, None] * weights).ravel()).sum() * line.length
-
-
-PARTS = 16
-"""Parts of a rigid member over which the length of a way along it is integrated."""

@@ -263,7 +263,8 @@ def asked_mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium
         raise SceneError(f"the scene itself has no equilibrium: {error}, accepted: one that has") from None
     model = max((step.model for step in solution.steps), key=lambda one: one.mesh.elements)
     asked = [settings.elements or member.elements for member in scene.members.values() if member.type == "flexible"]
-    mesh = model.mesh
+    # Tendons with friction are pulled or let out as at the first step.
+    mesh = replace(model.mesh, stops=())
     halved = max(step.certificate.halved or 0.0 for step in solution.steps)
     if not any(asked) and halved <= (settings.accuracy or scene.analysis.accuracy):
         # Half the elements are as near as was asked for.

@@ -113,7 +113,8 @@ class ControlledSystem:
         for name, tendon in scene.tendons.items():
             controlled = any(one.startswith(f"tendons.{name}.") for one in names) or tendon.history is not None
             if controlled and tendon.rubs:
-                message = "found a control of a tension that may rise and fall, with which friction would jump,"
+                what = "pull" if tendon.measured else "tension"
+                message = f"found a control of a {what} that may rise and fall, with which friction would jump,"
                 raise SceneError(f"{message} accepted: a tendon without friction", ("controls", f"tendons.{name}"))
             if controlled and tendon.measured and tendon.stiffness is None:
                 message = "found a control of a length that has to be followed at once, accepted: of a tension, or of a"

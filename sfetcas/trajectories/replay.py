@@ -18,6 +18,7 @@ from ..description.loads import History
 from ..description.records import counted, plain, unknown
 from ..description.scene import Scene, check_scene
 from ..description.showing import error_in_words, shown
+from ..description.sliding import check_sliding
 from ..dynamics.motion import MotionState, Trajectory
 from ..dynamics.sampling import StepRecord
 from ..dynamics.simulation import Simulation
@@ -276,6 +277,8 @@ class _Replays:
         kept = {key: getattr(analysis, key) for key in ("initial", "cut", "release") if analysis.type == "dynamic"}
         given = {"type": "dynamic", "end": self.end, "step": step, "integrator": self.integrator, **kept}
         one = self.scene.model_copy(update={"analysis": type(analysis)(**given), "expect": ()})
+        for name, by in one.shortenings.items():
+            check_sliding(name, one.tendons[name], by, one.analysis, one.histories)
         simulation = _Timed(one, self.settings)
         simulation.wanted = self.times
         run = simulation.run(self.mesh or simulation.mesh.refined(), 0)
