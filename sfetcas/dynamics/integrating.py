@@ -260,9 +260,9 @@ class Stepper:
 
     @functools.cached_property
     def _pulled(self) -> Index:
-        """Numbers of the places that tell how tendons of given length are pulled."""
-        model = self.system.model
-        names = [pulled_place(model.scene, model.mesh, tendon) for tendon in model.scene.tendons]
+        """Numbers of the places that tell how tendons of given length are pulled that rub."""
+        model, tendons = self.system.model, self.system.model.scene.tendons.items()
+        names = [pulled_place(model.scene, model.mesh, name) for name, tendon in tendons if tendon.rubs]
         return np.array([model.segments.place(name) for name in names if name], dtype=np.intp)
 
     def _told(self, memory: Memory, taken: Taken) -> Memory:

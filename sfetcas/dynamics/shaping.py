@@ -62,11 +62,14 @@ def shaped(equations: Equations, state: State, loading: Loading) -> tuple[State,
 
 
 def stretched(equations: Equations, state: State, loading: Loading) -> State:
-    """The state with elastic tendons as long as their ways: what they are longer by has no inertia to keep it."""
+    """The state with elastic tendons as long as their ways: what they are longer by has no inertia to keep it.
+
+    Of those that rub the tensions along the way decide about it, which the first step finds.
+    """
     model, y = equations.model, state.y.copy()
     gaps = equations.at(state, loading).residual[equations.unknowns :]
     for name, tendon in model.scene.tendons.items():
-        if tendon.stiffness is not None:
+        if tendon.stiffness is not None and not tendon.rubs:
             longer = model.positions.retained[model.segments.place(elongation_of(name)), 0]
             y[longer] += gaps[equations.row_names.index(f"tendons.{name}")]
     return replace(state, y=y)
