@@ -229,6 +229,13 @@ def test_end_of_the_curve_is_told():
     found = sfetcas.solve(scene(STRIP, {"type": "force", "node": "B", "value": [4810.0, 0.0]})).last
     assert any("ends at a strain of -0.06" in note or "ends at a strain of 0.05" in note for note in found.notes)
     assert not any("ends" in note for note in sfetcas.solve(scene(STRIP, BENT)).last.notes)
+    # Where it is exceeded only near the clamped end, and is far from it elsewhere.
+    heavy = {"type": "distributed", "member": "beam", "value": [5000.0, 0.0]}
+    (note,) = (note for note in sfetcas.solve(scene(STRIP, heavy)).last.notes if "ends" in note)
+    assert "ends at a strain of 0.05, and a fibre of member 'beam' has 0." in note
+    table = {"type": "table", "strain": [-0.1, 0.0, 0.02], "force": [-100.0, 0.0, 20.0]}
+    bar = scene({"EI3": 1.0, "stretch_law": table}, {**heavy, "value": [22.0, 0.0]})
+    assert any("ends at a strain of 0.02, and member 'beam'" in note for note in sfetcas.solve(bar).last.notes)
 
 
 # -- potentials of curvatures and strains ---------------------------------------------------------------
@@ -401,6 +408,10 @@ def test_motion_keeps_energy(integrator):
         (
             {**STRIP, "stretch_law": {"type": "table", "strain": [0, 1], "force": [0, 1]}, "stretch": False},
             None,
+        ),
+        (
+            {**STRIP, "law": {**UNEQUAL, "strain": STRAINS[:3], "stress": STRESSES[:3], "about": "b3"}},
+            "law.strain: found [-0.06, -0.01, 0.0], accepted: numbers from 0 on, or of both signs with 0",
         ),
         (
             {**STRIP, "stretch_law": {"type": "bilinear", "force": 1.0, "ratio": 0.5}},

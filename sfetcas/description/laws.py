@@ -435,6 +435,9 @@ class StressStrain(_OneAxis):
     @model_validator(mode="after")
     def _curve(self) -> StressStrain:
         signed(self.strain, self.stress, ("strain", "stress"))
+        if self.strain[-1] == 0.0:
+            found = f"found {say(self.strain)}"
+            raise SceneError(f"{found}, accepted: numbers from 0 on, or of both signs with 0", ("strain",))
         return self
 
     @property

@@ -840,7 +840,7 @@ class Fields:
                     f"at {x[i]:.3g} of its length: beyond the end the law is a guess, with the slope there"
                 )
             slack = law.slack(section, x, change)
-            i = first_of_largest(slack)
+            i = first_of_largest(np.maximum(slack, 0.0))
             # A gap keeps rounding from deciding.
             if slack[i] > tolerances.ALIKE:
                 found.append(
@@ -872,7 +872,7 @@ class Fields:
             strain = self.along(name, x)["strain"][:, 0]
             where = f"the law of stretch {law.type!r} of section {str(scene.members[name].section)!r}"
             over = np.maximum(strain - high, low - strain)
-            i = first_of_largest(over)
+            i = first_of_largest(np.maximum(over, 0.0))
             if over[i] > tolerances.WRITTEN * max(abs(low), abs(high)):
                 end = high if strain[i] > high else low
                 found.append(
@@ -961,7 +961,7 @@ def _beyond_fibres(law: Any, section: Any, x: Array, strain: Array, bent: Array,
         return []
     reach = section.fibres(x)[:, 2 if form.about == BOTH else form.about - 1] * np.abs(bent)
     over = np.maximum(strain + reach - high, low - strain + reach)
-    i = first_of_largest(over)
+    i = first_of_largest(np.maximum(over, 0.0))
     if not over[i] > tolerances.WRITTEN * max(abs(low), abs(high)):
         return []
     above = strain[i] + reach[i] - high == over[i]
