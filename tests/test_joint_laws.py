@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from test_codegen import built, needs_compiler, said
 
 import sfetcas
-from sfetcas import CrossSection, Potential, Scene, SceneError
+from sfetcas import CrossSection, Potential, Scene, SceneError, SolveError
 from sfetcas.mathematics.forms import Form
 from sfetcas.mathematics.potentials import derivatives_of
 from sfetcas.mechanics.laws import AlongElement
@@ -236,6 +236,14 @@ def test_end_of_the_curve_is_told():
     table = {"type": "table", "strain": [-0.1, 0.0, 0.02], "force": [-100.0, 0.0, 20.0]}
     bar = scene({"EI3": 1.0, "stretch_law": table}, {**heavy, "value": [22.0, 0.0]})
     assert any("ends at a strain of 0.02, and member 'beam'" in note for note in sfetcas.solve(bar).last.notes)
+
+
+def test_more_than_the_plastic_force_is_refused():
+    """Beyond it nothing holds: what is in balance to rounding at strains of 1e20 is no equilibrium."""
+    section = {**FLAT, "law": {"type": "plateau", "stress": 6e8}}
+    pulled = scene(section, {"type": "force", "node": "B", "value": [4801.0, 0.0]})
+    with pytest.raises(SolveError, match="the energy falls without bound"):
+        sfetcas.solve(pulled)
 
 
 # -- potentials of curvatures and strains ---------------------------------------------------------------
