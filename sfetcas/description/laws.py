@@ -14,11 +14,11 @@ from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, final
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
-from ..mathematics.arrays import Array, numbers, values_of
+from ..mathematics.arrays import TINY, Array, numbers, values_of
 from ..mathematics.forms import BOTH, Form, hermite_of, monotone_slopes
 from ..mathematics.interpolation import gauss
 from .records import Number, Numbers, Positive, Record, Sized, listed, number, say
@@ -72,7 +72,11 @@ class SectionLaw(Record):
     @property
     @abc.abstractmethod
     def form(self) -> Form:
-        """The form of its potential."""
+        """The form of its potential, of a section that does not stretch where that makes a difference."""
+
+    def form_in(self, section: Any) -> Form:
+        """The form of its potential in a section, which may depend on the strain along where that stretches."""
+        return self.form
 
     @abc.abstractmethod
     def values(self, section: Any, x: Array) -> Array:
@@ -94,6 +98,15 @@ class SectionLaw(Record):
         """Least and largest change of curvature for which it is given at fractions x, (n, 2), 1/m."""
         return np.tile(self.span, (len(x), 1))
 
+    @property
+    def fibre_span(self) -> tuple[float, float]:
+        """Least and largest strain of a fibre for which it is given, where it is a law of fibres."""
+        return -np.inf, np.inf
+
+    def yields(self, section: Any, own: Array, x: Array) -> Array:
+        """Compliances (n, 3) along b1, b2, b3 at rest, 1/N, with those (n, 3) of the section itself given."""
+        return own
+
     def check(self, section: Any) -> None:
         """Refuse a section that it does not fit; a law that fits every one refuses none.
 
@@ -107,9 +120,8 @@ class SectionLaw(Record):
         """Above 0 where changes (n, 3) of the curvatures, 1/m, at fractions x leave it without stiffness, (n,)."""
         return np.full(len(x), -1.0)
 
-    @property
-    def stays_in_plane(self) -> bool:
-        """Whether bending about b2 or b3 alone gives no moment about other axes."""
+    def stays_in_plane(self, axis: int) -> bool:
+        """Whether bending about b2 or b3 alone, given as 2 or 3, gives no moment about other axes."""
         return True
 
 
@@ -132,6 +144,17 @@ class _OneAxis(SectionLaw):
     def _bending(self, section: Any, x: Array) -> Array:
         """Bending stiffness about the axis at fractions x, (n,), N m2."""
         return numbers(section.own_stiffness(x)[:, 2 if self.axis == BOTH else self.axis - 1])
+
+    def _on_fibres(self, section: Any, x: Array, unit: Array, curve: Any) -> Array:
+        """Values of the form ``curve`` at fractions x (n,), with the unit of strain (n,), kinks and changes of slope.
+
+        These are over the unit of strain, and over E.
+        """
+        reach = section.fibres(x)[:, 2 if self.axis == BOTH else self.axis - 1]
+        bent, row = unit / reach, numbers(curve)
+        inner = section.hollow(x)
+        columns = np.stack([self._bending(section, x) * bent**2, bent, reach, inner], axis=1)
+        return numbers(np.concatenate([columns, np.broadcast_to(row, (len(x), row.shape[0]))], axis=1))
 
     def check(self, section: Any) -> None:
         """Refuse other stiffnesses about b2 and b3 where it is about both.
@@ -238,7 +261,8 @@ class Plateau(_OneAxis):
     """Bending of a rectangle of a superelastic material: linear up to a stress, which then stays the same.
 
     It is the loading curve of a material whose stress is E times the strain up to the plateau; unloading goes back the
-    same way.  For other shapes, and for plateaus that end, give the curve of the material (``stress-strain``).
+    same way.  For other shapes, and for plateaus that end, give the curve of the material (``stress-strain``).  In a
+    section that stretches axial force and moment act upon the same fibres.
 
     Parameters
     ----------
@@ -259,8 +283,15 @@ class Plateau(_OneAxis):
         """No numbers."""
         return Form("plateau", self.axis)
 
+    def form_in(self, section: Any) -> Form:
+        """Where the section stretches a curve with a kink at either end of what is elastic."""
+        return Form("curve", self.axis, 2, strains=1) if section.stretch else self.form
+
     def values(self, section: Any, x: Array) -> Array:
         """In units of the curvature at which the outer fibres reach the plateau."""
+        if section.stretch:
+            yields = self.stress / section.fibres(x)[:, 0]
+            return self._on_fibres(section, x, yields, [-1.0, 1.0, -1.0, -1.0])
         young, *reach = section.fibres(x).T
         bent = self.stress / (young * reach[self.axis - 2])
         return np.stack([self._bending(section, x) * bent**2, bent], axis=1)
@@ -379,7 +410,9 @@ class MomentTable(_OneAxis):
 class StressStrain(_OneAxis):
     """Bending of a shape whose material has a given curve of stress over strain, which may differ by its sign.
 
-    The stress is integrated over the section once, with the neutral axis where the axial force is zero.
+    The stress is integrated over the section once, with the neutral axis where the axial force is zero.  In a section
+    that stretches the axial force is that of the fibres, too: their strain is that along the member and that of bending
+    together, so that axial force and moment depend on both.
 
     Parameters
     ----------
@@ -402,6 +435,9 @@ class StressStrain(_OneAxis):
     @model_validator(mode="after")
     def _curve(self) -> StressStrain:
         signed(self.strain, self.stress, ("strain", "stress"))
+        if self.strain[-1] == 0.0:
+            found = f"found {say(self.strain)}"
+            raise SceneError(f"{found}, accepted: numbers from 0 on, or of both signs with 0", ("strain",))
         return self
 
     @property
@@ -414,6 +450,22 @@ class StressStrain(_OneAxis):
         """A table of the integrated moments."""
         return Form("table", self.axis, KNOTS)
 
+    def form_in(self, section: Any) -> Form:
+        """Where the section stretches the kinks of the curve itself."""
+        if not section.stretch:
+            return self.form
+        return Form("curve", self.axis, len(values_of(self._kinks()[0])), strains=1)
+
+    def _kinks(self) -> tuple[Array, Array]:
+        """Strains but for 0 at which the slope changes, and by how much outwards, over that beside 0; (m,) each."""
+        strain, stress = self.both
+        zero = int(np.flatnonzero(values_of(strain) == 0.0)[0])
+        slopes = (stress[1:] - stress[:-1]) / (strain[1:] - strain[:-1])
+        # The last slopes go on beyond the ends.
+        below = (slopes[: zero - 1] - slopes[1:zero]) / slopes[zero - 1]
+        above = (slopes[zero + 1 :] - slopes[zero:-1]) / slopes[zero]
+        return numbers(np.concatenate([strain[1:zero], strain[zero + 1 : -1]])), numbers(np.concatenate([below, above]))
+
     def check(self, section: Any) -> None:
         """Refuse another slope at zero than E, and an axis that the shape does not have.
 
@@ -422,7 +474,7 @@ class StressStrain(_OneAxis):
         SceneError
             Names the key.
         """
-        young, (strain, stress) = values_of(section.fibres(np.array([0.0]))[:, 0]).item(), self.both
+        young, (strain, stress) = values_of(section.fibres(np.array([0.0]))[:, 0]).item(), map(values_of, self.both)
         zero = int(np.flatnonzero(strain == 0.0)[0])
         for i in (zero - 1, zero):
             slope = (stress[i + 1] - stress[i]) / (strain[i + 1] - strain[i])
@@ -437,15 +489,23 @@ class StressStrain(_OneAxis):
     @property
     def both(self) -> tuple[Array, Array]:
         """Strains and stresses of both signs."""
-        strain, stress = np.array(self.strain), np.array(self.stress)
-        if strain[0] == 0.0:
+        strain, stress = numbers(list(self.strain)), numbers(list(self.stress))
+        if values_of(strain[0]) == 0.0:
             return np.concatenate([-strain[:0:-1], strain]), np.concatenate([-stress[:0:-1], stress])
         return strain, stress
 
     def values(self, section: Any, x: Array) -> Array:
-        """In units of the curvature of the end of the table, for a section with a reach of 1."""
+        """In units of the curvature of the end of the table, for a section with a reach of 1.
+
+        Where the section stretches in units of the largest strain of the curve.
+        """
+        if section.stretch:
+            kinks, changes = self._kinks()
+            largest = float(np.abs(values_of(self.both[0])).max())
+            curve = numbers(np.concatenate([kinks / largest, changes]))
+            return self._on_fibres(section, x, numbers(np.full(len(x), largest)), curve)
         if hasattr(numbers([*self.strain, *self.stress]), "expression"):
-            message = "found a number of a curve of stress over strain, accepted: one that is not integrated"
+            message = "found a number of a curve of stress over strain, accepted: one of a section that stretches"
             raise SceneError(message, ("arguments",))
         reach = section.fibres(x)[:, 1:].T
         reach = reach[1 if self.axis == BOTH else self.axis - 2]
@@ -454,6 +514,12 @@ class StressStrain(_OneAxis):
         bent, row = knots[-1] / reach, hermite_of(knots / knots[-1], moments / knots[-1], slopes)
         units = np.stack([bending * bent**2, bent], axis=1)
         return numbers(np.concatenate([units, np.broadcast_to(row, (len(x), len(row)))], axis=1))
+
+    @property
+    def fibre_span(self) -> tuple[float, float]:
+        """From the first to the last strain of the curve."""
+        strain = values_of(self.both[0])
+        return float(strain[0]), float(strain[-1])
 
     def reach(self, section: Any, x: Array) -> Array:
         """Where a fibre reaches the end of the curve."""
@@ -465,12 +531,12 @@ class StressStrain(_OneAxis):
         """Knots, moments and slopes of a section with reach 1, E = 1 and second moment 1."""
         ratio = 0.0
         if section.shape == "tube":
-            outer, inner = (values_of(part) for part in section.radii(np.array([0.0, 0.5, 1.0])))
-            ratio = float(inner[0] / outer[0])
-            if not np.allclose(inner / outer, ratio, rtol=tolerances.WRITTEN):
+            shares = values_of(section.hollow(np.array([0.0, 0.5, 1.0])))
+            ratio = float(shares[0])
+            if not np.allclose(shares, ratio, rtol=tolerances.WRITTEN):
                 message = "found a tube whose inner radius is not everywhere the same share of the outer one"
                 raise SceneError(f"{message}, accepted: one share with the law 'stress-strain'", ("law",))
-        strain, stress = self.both
+        strain, stress = map(values_of, self.both)
         return _integrated(tuple(strain), tuple(stress), section.shape == "rectangle", ratio)
 
 
@@ -721,26 +787,33 @@ class _Remembering(_OneAxis):
     @property
     def form(self) -> Form:
         """The material, and fibres that remember."""
-        count = 1 if self.stress is None else len(_fibres_of("circle" if self.axis == BOTH else "rectangle", 0.0))
-        return Form(self.material_name, self.axis, count, spread=self.axis == BOTH and self.stress is not None)
+        return self._form_of(stretches=False)
+
+    def form_in(self, section: Any) -> Form:
+        """Where the section of fibres stretches these are those of all of it, not of half."""
+        return self._form_of(section.stretch and self.stress is not None)
+
+    def _form_of(self, stretches: bool) -> Form:
+        shape, fibres = "circle" if self.axis == BOTH else "rectangle", self.stress is not None
+        count = len(_fibres_of(shape, 0.0, stretches)) if fibres else 1
+        return Form(self.material_name, self.axis, count, spread=self.axis == BOTH and fibres, strains=int(stretches))
 
     def values(self, section: Any, x: Array) -> Array:
         """In units of the end of the first elastic range; nothing is remembered."""
-        bending = self._bending(section, x)
+        bending, form = self._bending(section, x), self.form_in(section)
         if self.stress is None:
             assert self.moment is not None
             bent, rows = self.moment / bending, np.ones((len(x), 2))
         else:
             young, *reach = section.fibres(x).T
-            bent = self.stress / (young * reach[1 if self.axis == BOTH else self.axis - 2])
-            inner = np.zeros(len(x))
-            if section.shape == "tube":
-                outer, inside = section.radii(x)
-                inner = values_of(inside / outer)
-            rows = np.stack([_fibres_of(section.shape, float(share)).T.ravel() for share in inner])
+            reach = reach[1 if self.axis == BOTH else self.axis - 2]
+            bent = self.stress / (young * reach)
+            shares = values_of(section.hollow(x))
+            rows = np.stack([_fibres_of(section.shape, float(s), form.strains > 0).T.ravel() for s in shares])
+            rows = np.concatenate([reach[:, None], rows], axis=1) if form.strains else rows
         material = numbers([self.material] * len(x)).reshape(len(x), -1)
         units = np.stack([bending * bent**2, bent], axis=1)
-        return numbers(np.concatenate([units, material, rows, np.zeros((len(x), self.form.memory))], axis=1))
+        return numbers(np.concatenate([units, material, rows, np.zeros((len(x), form.memory))], axis=1))
 
 
 FIBRES = 12
@@ -751,11 +824,21 @@ ROUND_FIBRES = (3, 10)
 
 
 @functools.lru_cache(maxsize=256)
-def _fibres_of(shape: str, inner: float) -> Array:
+def _fibres_of(shape: str, inner: float, whole: bool = False) -> Array:
     """Weights, and places over the reach of the section, of the fibres of half a section, (n, 2) or (n, 3).
 
-    The weights make the second moment 1.  The other half has the opposite strains and stresses.
+    The weights make the second moment 1.  The other half has the opposite strains and stresses, unless the section
+    stretches: then they are those of the ``whole`` section, whose area the weights have, too.
     """
+    if whole:
+        half = _fibres_of(shape, inner)
+        other = half * [1.0, *[-1.0] * (half.shape[1] - 1)]
+        both = np.concatenate([half, other]) * [0.5, *[1.0] * (half.shape[1] - 1)]
+        if shape == "rectangle":
+            # The area over the second moment of a reach of 1 is 3.
+            share = both[:, 0].sum() / 3.0
+            both = both * [1.0 / share, np.sqrt(share)]
+        return both
     if shape == "rectangle":
         # Midpoints of equal parts, of which those of no kink leave the same error each.
         y = (np.arange(FIBRES) + 0.5) / FIBRES
@@ -774,7 +857,8 @@ def _fibres_of(shape: str, inner: float) -> Array:
 class ElasticPlastic(_Remembering):
     """Bending that is elastic up to a moment, then plastic with a share of the stiffness, and unloads elastically.
 
-    It is linear kinematic hardening: the elastic range stays as wide as it is, and moves.
+    It is linear kinematic hardening: the elastic range stays as wide as it is, and moves.  With ``stress``, in a
+    section that stretches, axial force and moment act upon the same fibres.
 
     Parameters
     ----------
@@ -806,7 +890,8 @@ class ElasticPlastic(_Remembering):
 class Superelastic(_Remembering):
     """Bending with a plateau on loading and a lower one on unloading, from which it comes back without a rest.
 
-    It has the stiffness of the section before and beyond the plateaus, and on unloading between them.
+    It has the stiffness of the section before and beyond the plateaus, and on unloading between them.  With ``stress``,
+    in a section that stretches, axial force and moment act upon the same fibres.
 
     Parameters
     ----------
@@ -904,13 +989,22 @@ class Superelastic(_Remembering):
         return numbers(np.concatenate([found[:, :2], material, found[:, 6:]], axis=1))
 
 
-def _potential(value: Any) -> str:
+def _strains(value: int) -> int:
+    if value not in (0, 1, 3):
+        raise ValueError(f"found {value}, accepted: 0, 1 or 3")
+    return value
+
+
+def _potential(value: Any, info: ValidationInfo) -> str:
     """A function of CasADi, or one of Python that makes an expression, as a text."""
     from ..mathematics.potentials import text_of
 
-    accepted = "a function of the three changes of curvature (twist, about b2, about b3) that gives one number, J/m"
+    strains = info.data.get("strains", 0)
+    followed = {0: "", 1: " and the strain along", 3: " and the strains along b1, b2, b3"}[strains]
+    accepted = f"a function of the three changes of curvature (twist, about b2, about b3){followed}"
+    accepted += " that gives one number, J/m"
     try:
-        return text_of(value)
+        return text_of(value, 3 + strains)
     except ValueError as error:
         raise ValueError(f"found {error.args[0] or say(value)}, accepted: {accepted}") from None
 
@@ -935,23 +1029,28 @@ def check_parameters(given: tuple[float, ...], wanted: int) -> None:
 
 @final
 class Potential(SectionLaw):
-    """Any potential per length of the changes of twist and of the curvatures about b2 and b3.
+    """Any potential per length of the changes of twist and of the curvatures about b2 and b3, and of strains.
 
-    The section gives no stiffness beside it.
+    The section gives no stiffness beside it that it says itself.
 
     Parameters
     ----------
+    strains : number
+        How many strains follow the three curvatures: ``1`` for that along, so that the section stretches and has no
+        ``EA``, or ``3`` for those along b1, b2 and b3, so that it also shears and has no ``GA2`` and ``GA3``.
+        Default: ``0``.
     potential : function
-        Energy per length, J/m, as a CasADi ``Function`` of the three curvatures (1/m), or of these and the parameters;
-        or a Python function that makes an expression of them.  In a file: the text that ``serialize()`` gives.
+        Energy per length, J/m, as a CasADi ``Function`` of the three curvatures (1/m) and the strains as one vector, or
+        of this and the parameters; or a Python function that makes an expression of them.  In a file: the text that
+        ``serialize()`` gives.
     parameters : (m,)
         Numbers that the function takes as its second argument, in their own units.  Default: none.
     """
 
-    gives: ClassVar[tuple[str, ...]] = ("EI2", "EI3", "GJ")
     convex: ClassVar[bool] = False
 
     type: Literal["potential"] = "potential"
+    strains: Annotated[int, AfterValidator(_strains)] = 0
     potential: Annotated[str, BeforeValidator(_potential)]
     parameters: Annotated[tuple[float, ...], BeforeValidator(parameters_given)] = ()
 
@@ -961,6 +1060,10 @@ class Potential(SectionLaw):
         gradient, hessian = self._at_rest()
         if not np.isfinite([*gradient, *hessian.ravel()]).all():
             raise SceneError("found one that has no two derivatives at rest, accepted: a smooth one", ("potential",))
+        gradient, hessian = (values_of(part) for part in (gradient, hessian))
+        if self.strains:
+            self._sound_with_strains(gradient, hessian)
+            return self
         lowest = float(np.linalg.eigvalsh(hessian)[0])
         if lowest <= tolerances.RANK * np.abs(hessian).max():
             found = f"found second derivatives at curvature 0 with an eigenvalue of {lowest:g} N m2"
@@ -972,6 +1075,43 @@ class Potential(SectionLaw):
             raise SceneError(message, ("potential",))
         return self
 
+    def _sound_with_strains(self, gradient: Array, hessian: Array) -> None:
+        """Refuse a potential of curvatures and strains that is not convex at rest, or has moments or forces there."""
+        diagonal = hessian.diagonal()
+        unit = np.sqrt(np.maximum(diagonal, TINY))
+        lowest = float(np.linalg.eigvalsh(hessian / unit[:, None] / unit)[0])
+        if diagonal.min() <= 0.0 or lowest <= tolerances.RANK:
+            found = f"found second derivatives at rest of {say(diagonal.tolist())}"
+            if diagonal.min() > 0.0:
+                found = f"found second derivatives at rest with an eigenvalue of {lowest:g} beside a diagonal of ones"
+            raise SceneError(f"{found}, accepted: a potential that is convex there", ("potential",))
+        if (np.abs(gradient) > tolerances.DECIMAL * diagonal).any():
+            found = f"found moments and forces of {say(gradient.tolist())} N m and N at rest"
+            raise SceneError(f"{found}, accepted: none", ("potential",))
+
+    def check(self, section: Any) -> None:
+        """Refuse damping where strains are coupled at rest, of which that knows each by itself.
+
+        Raises
+        ------
+        SceneError
+            Names the law.
+        """
+        if not section.damping or not self.strains:
+            return
+        hessian = values_of(self._at_rest()[1])
+        unit = np.sqrt(hessian.diagonal())
+        coupled = np.abs(hessian / unit[:, None] / unit - np.eye(len(hessian)))
+        coupled[:3, :3] = 0.0
+        if coupled.max() > tolerances.DECIMAL:
+            message = "found a potential that couples strains with others at rest beside 'damping', accepted: one"
+            raise SceneError(f"{message} that does not, or no damping")
+
+    @property
+    def gives(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Those of bending and twist, and of the strains that it has."""
+        return ("EI2", "EI3", "GJ", *("EA", "GA2", "GA3")[: self.strains])
+
     @property
     def _wanted(self) -> int:
         from ..mathematics.potentials import parameters_of
@@ -981,7 +1121,7 @@ class Potential(SectionLaw):
     @property
     def form(self) -> Form:
         """The function, its parameters as numbers."""
-        return Form("given", 3, self._wanted, given=self.potential)
+        return Form("given", 3, self._wanted, given=self.potential, strains=self.strains)
 
     def _padded(self) -> Array:
         """The parameters, then zeros for those that the function does not use."""
@@ -989,7 +1129,7 @@ class Potential(SectionLaw):
         return numbers(np.concatenate([given, np.zeros(self._wanted - len(self.parameters))]))
 
     def _at_rest(self) -> tuple[Array, Array]:
-        """Gradient (3,), N m, and second derivatives (3, 3), N m2, at rest."""
+        """Gradient (3,), N m, and second derivatives (3, 3), N m2, at rest; with strains also N and N m."""
         from ..mathematics.potentials import at_rest
 
         return at_rest(self.potential, self._padded())
@@ -1001,21 +1141,37 @@ class Potential(SectionLaw):
 
     def stiffness(self, section: Any, values: Array, x: Array) -> Array:
         """The second derivatives at rest."""
-        return np.tile(self._at_rest()[1], (len(x), 1, 1))
+        return np.tile(self._at_rest()[1][:3, :3], (len(x), 1, 1))
 
-    @property
-    def stays_in_plane(self) -> bool:
-        """Whether bending about b3 alone, and about b2 alone, gives no moment about other axes, tried at some."""
+    def yields(self, section: Any, own: Array, x: Array) -> Array:
+        """One over the second derivatives at rest by each of its strains."""
+        if not self.strains:
+            return own
+        hessian, ones = self._at_rest()[1], np.ones(len(x))
+        found = [ones / hessian[3 + i, 3 + i] for i in range(self.strains)]
+        return np.stack([*found, *(own[:, i] for i in range(self.strains, 3))], axis=1)
+
+    def stays_in_plane(self, axis: int) -> bool:
+        """Whether bending about b2 or b3 alone, given as 2 or 3, gives no moment about other axes, tried at some.
+
+        With strains also whether it and strains in the plane give no force across that.
+        """
         from ..mathematics.potentials import derivatives_of
 
         derivatives, p = derivatives_of(self.form), values_of(self._padded())
-        rest = values_of(self._at_rest()[1])
-        for axis in (1, 2):
-            for k in np.outer([1e-3, 1.0, 1e3], [-1.0, -0.37, 0.61]).ravel():
-                x = np.zeros(3)
-                x[axis] = k
+        size = self.form.arguments
+        # What the form leaves out: the quadratic part without that of strains with others.
+        rest = values_of(self._at_rest()[1]).copy()
+        rest[3:, :3], rest[:3, 3:] = 0.0, 0.0
+        rest[3:, 3:] = np.diag(rest[3:, 3:].diagonal())
+        # The strain along, and that across in the plane: along b2 where it bends about b3.
+        inside = [i for i in (axis - 1, 3, 7 - axis) if i < size]
+        for k in np.outer([1e-3, 1.0, 1e3], [-1.0, -0.37, 0.61]).ravel():
+            for strain in (0.0,) if not self.strains else (0.0, -1e-3, 2e-3):
+                x = np.zeros(size)
+                x[inside] = [k, strain, 0.7 * strain][: len(inside)]
                 found = derivatives(x, p)[1].full().ravel() + rest @ x
-                if np.abs(np.delete(found, axis)).max() > tolerances.DECIMAL * np.abs(found).max():
+                if np.abs(np.delete(found, inside)).max() > tolerances.DECIMAL * np.abs(found).max():
                     return False
         return True
 

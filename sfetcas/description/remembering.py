@@ -67,9 +67,6 @@ def check_memory(scene: Any) -> None:
         message = f"found 'all', accepted: 'one' with the law {law!r} {whose}"
         raise SceneError(message, ("analysis", "equilibria"))
     beside = "accepted: none beside a law with memory"
-    if scene.sections[section].stretches:
-        message = "found one with a section that stretches or shears, accepted: of one that does neither"
-        raise SceneError(message, ("sections", section, "law"))
     if scene.rotating is not None:
         raise SceneError(f"found rotating axes, {beside}", ("rotating",))
     if scene.contacts:

@@ -398,8 +398,9 @@ class CrossSection(Record):
         ``sadowsky``, ``elastic-plastic``, ``superelastic`` or, in Python, ``potential``) and the keys of that law.
         Default: linear.
     stretch_law : table
-        Axial force that is not proportional to the strain along: a table with the key ``type`` (``bilinear``, ``table``
-        or, in Python, ``potential``) and the keys of that law.  Default: linear.
+        Axial force that is not proportional to the strain along, by a law that bending does not change: a table with
+        the key ``type`` (``bilinear``, ``table`` or, in Python, ``potential``) and the keys of that law.  Default:
+        linear.
     damping : s
         Retardation time of Kelvin and Voigt: a moment, and a force where it stretches or shears, is the stiffness
         times (the strain + ``damping`` times its rate).  With a law it is that of the stiffness at rest.
@@ -518,6 +519,9 @@ class CrossSection(Record):
             raise SceneError(message, ("stretch_law",))
         if self.relaxation:
             raise SceneError("found beside 'relaxation', accepted: one of them", ("stretch_law",))
+        if self.law is not None and self.law.form_in(self).strains:
+            message = f"found beside the law {self.law.type!r}, which says the axial force of a section that stretches"
+            raise SceneError(f"{message}, accepted: one of them", ("stretch_law",))
 
     def _check_law(self, law: Law) -> None:
         if self.coupling is not None:
@@ -673,7 +677,7 @@ class CrossSection(Record):
     def couples(self, axis: int) -> bool:
         """Whether bending about the axis b2 or b3, given as 2 or 3, is coupled with anything else."""
         others = {2: (0, 2), 3: (1, 2)}[axis]
-        if self.law is not None and not self.law.stays_in_plane:
+        if self.law is not None and not self.law.stays_in_plane(axis):
             return True
         return self.coupling is not None and any(self.coupling[i] != 0.0 for i in others)
 
@@ -742,18 +746,21 @@ class CrossSection(Record):
     @property
     def stretches(self) -> bool:
         """Whether it stretches or shears."""
-        return bool(self._given(("EA", "GA2", "GA3", "stiffness_", "stretch_law")) or self._switched())
+        given = self._given(("EA", "GA2", "GA3", "stiffness_", "stretch_law")) or self._switched()
+        return bool(given) or (self.law is not None and self.law.form.strains > 0)
 
     def compliance(self, x: ArrayLike) -> Floats:
         """Strains by section forces: x (n,) fractions of the length -> (n, 3) 1/EA, 1/GA2, 1/GA3 in 1/N.
 
-        Along b1, b2, b3; zero where it neither stretches nor shears; with a law of stretch that at rest; of a stiffness
-        matrix the diagonal of :meth:`compliance_of_forces`.
+        Along b1, b2, b3; zero where it neither stretches nor shears; with a law that at rest; of a stiffness matrix the
+        diagonal of :meth:`compliance_of_forces`.
         """
         if self.stiffness_ is not None:
             found = self.compliance_of_forces(x)
             return np.stack([found[:, i, i] for i in range(3)], axis=1)
         own = self._own_compliance(x)
+        if self.law is not None:
+            own = self.law.yields(self, own, np.atleast_1d(numbers(x)))
         if self.stretch_law is None or not self.stretch_law.gives:
             return own
         along = evaluate(0.0, x) + 1.0 / self.stretch_law.stiffness
@@ -861,9 +868,9 @@ class CrossSection(Record):
         }[self.shape or ""]
         return np.stack([self._value("E", x), *(half * self._value(name, x) for name in names)], axis=1)
 
-    def radii(self, x: ArrayLike) -> tuple[Floats, Floats]:
-        """Outer and inner radius (m) of a tube at fractions x (n,), each (n,)."""
-        return self._value("outer", x), self._value("inner", x)
+    def hollow(self, x: ArrayLike) -> Floats:
+        """Inner over outer radius of a tube at fractions x (n,), (n,); zero for other shapes."""
+        return self._value("inner", x) / self._value("outer", x) if self.shape == "tube" else evaluate(0.0, x)
 
     @property
     def heavy(self) -> bool:

@@ -73,7 +73,8 @@ class Conserving(Method):
                     "found with the integrator 'conserving', which cannot follow shear without inertia of its own, "
                     "accepted: radau-3, radau-2, generalised-alpha, or a section without shear"
                 )
-                key = "shear" if model.scene.sections[section].shear else "GA2"
+                own = model.scene.sections[section]
+                key = "shear" if own.shear else "law" if own.law is not None and own.law.form.strains > 1 else "GA2"
                 raise SceneError(message, ("sections", section, key))
         for member in model.scene.members.values():
             off = member.off_line(model.scene.sections)

@@ -192,7 +192,7 @@ class Stepper:
         unwrapping, unwrapped, remembered = system.model.unwrapping, memory.unwrapped, memory.remembered
         unwrapped = unwrapping.angles(q, unwrapped) if unwrapping.count else unwrapped
         # All stages of a step know what was remembered at its begin; its end is remembered by the next one.
-        remembered = system.memory.after(q, remembered) if system.memory.size else remembered
+        remembered = system.memory.after(q, y, remembered) if system.memory.size else remembered
         kept = rates.reshape(method.kept, n.x)
         after = replace(
             memory,

@@ -56,10 +56,11 @@ def _fronts(found: Solved) -> Array:
     model, equations = found.model, found.equations
     errors, present, mixed = front_errors(found.fields)
     errors *= mixed[:, None]
+    errors, longer = errors[:, :3], errors[:, 3]
     answered = np.linalg.norm(errors, axis=1)
     chosen = np.flatnonzero(answered > SMALL * answered.max(initial=0.0))
     if not len(chosen):
-        return answered
+        return answered + longer
     moments = np.zeros((len(answered), 3))
     for name, cuts in model.mesh.cuts.items():
         section = model.scene.sections.get(str(model.scene.members[name].section))
@@ -83,7 +84,7 @@ def _fronts(found: Solved) -> Array:
     equations.solver.factor(equations.regularised(found.point.entries, primal, tolerances.DUAL))
     turned = np.abs(equations.solver.solve(right)[: equations.rotation_unknowns]).max(axis=0, initial=0.0)
     answered[chosen] = np.maximum(answered[chosen], turned)
-    return answered
+    return answered + longer
 
 
 SMALL = 1e-3
@@ -184,7 +185,7 @@ class MemorySteps:
             refuse_unrestrained(prepared, factor)
             step = self._beside(prepared, near[i]) if near else None
             found.append(step or self._step(prepared, factor, found))
-            mesh = remembering(prepared.model, found[-1].solved.state.q)
+            mesh = remembering(prepared.model, found[-1].solved.state.q, found[-1].solved.state.y)
         return tuple(found)
 
     def _beside(self, prepared: Prepared, near: EquilibriumResult) -> EquilibriumResult | None:

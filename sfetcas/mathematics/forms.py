@@ -25,12 +25,12 @@ class Form:
     Attributes
     ----------
     name : str
-        ``bilinear``, ``plateau``, ``ramberg_osgood``, ``table``, ``ribbon``, ``sadowsky`` or ``given``; with memory
-        ``sliders`` or ``superelastic``, see :mod:`~sfetcas.mathematics.hysteresis`.
+        ``bilinear``, ``plateau``, ``ramberg_osgood``, ``table``, ``ribbon``, ``sadowsky``, ``curve`` or ``given``; with
+        memory ``sliders`` or ``superelastic``, see :mod:`~sfetcas.mathematics.hysteresis`.
     about : int
         Axis of bending: 2, 3 or :data:`BOTH`; of a ribbon the axis about which it is soft; 1 of the strain along.
     count : int
-        Knots of a table, parameters of a given function, fibres of what has memory.
+        Knots of a table, kinks of the curve of a material, parameters of a given function, fibres of what has memory.
     odd : bool
         Whether a table gives the moments of one sign of the curvature, those of the other one being opposite.
     given : str
@@ -38,6 +38,8 @@ class Form:
     spread : bool
         Whether fibres are spread over the section, so that curvatures about both axes strain each; else what remembers
         about both axes remembers a vector.
+    strains : int
+        How many strains follow the three curvatures: none, that along, or those along b1, b2 and b3.
     """
 
     name: str
@@ -46,20 +48,28 @@ class Form:
     odd: bool = True
     given: str = ""
     spread: bool = False
+    strains: int = 0
 
     def __str__(self) -> str:
         """A text that may be part of the name of a function."""
         digest = hashlib.sha256(self.given.encode()).hexdigest()[:16] if self.given else ""
-        return (
-            f"{self.name}_{self.about}_{self.count}_{'spread' if self.spread else 'odd' if self.odd else 'any'}{digest}"
-        )
+        kind = "spread" if self.spread else "odd" if self.odd else "any"
+        strained = f"strained{self.strains}" if self.strains else ""
+        return f"{self.name}_{self.about}_{self.count}_{kind}{strained}{digest}"
+
+    @property
+    def arguments(self) -> int:
+        """How many curvatures and strains it depends on."""
+        return 3 + self.strains
 
     @property
     def size(self) -> int:
         """How many numbers it has; the last ones are what it remembers."""
         if self.remembers:
-            # Those of the material, then weights, places and internal variables of the fibres.
-            return CONSTANTS[self.name] + (1 + self.places) * self.count + self.memory
+            # Those of the material, the reach where it stretches; weights, places, internal variables of the fibres.
+            return CONSTANTS[self.name] + self.strains + (1 + self.places) * self.count + self.memory
+        if self.name == "curve":
+            return 2 + 2 * self.count
         return {"bilinear": 1, "plateau": 0, "ramberg_osgood": 2, "table": 3 * self.count, "ribbon": 1}.get(
             self.name, self.count
         )

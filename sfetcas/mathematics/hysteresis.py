@@ -9,8 +9,9 @@ The minimum w(x; z) is a convex potential of x with continuous slopes, the momen
 (the play operator: z' stays where it is between two bounds that move with x).  Stored energy and dissipation together
 are exact for a step within which each strain goes one way.
 
-A section is a sum of fibres: the strain of each is ``e = s.x``, its energy counts with a weight, and all have the same
-material.  One fibre with ``s = 1`` is a law of the moment itself.  The materials, with stress and strain over those at
+A section is a sum of fibres: the strain of each is ``e = s.x``, where the section stretches with the strain along over
+the reach more, its energy counts with a weight, and all have the same material.  One fibre with ``s = 1`` is a law of
+the moment itself.  The materials, with stress and strain over those at
 the end of the first elastic range:
 
 - ``sliders``: a spring beside a slider in series with a spring, elastic-plastic with linear kinematic hardening:
@@ -29,7 +30,7 @@ import casadi as ca
 
 from .forms import BOTH, CONSTANTS, Form
 
-__all__ = ["INSIDE", "energies", "lasting", "updated"]
+__all__ = ["INSIDE", "energies", "lasting", "stiffness", "updated"]
 
 INSIDE = 1e-12
 """Internal variables of the end of a step lie by this share of the elastic range within its bounds, so that rounding
@@ -37,50 +38,64 @@ does not decide whether a section begins the next step elastically: it does."""
 
 
 def energies(form: Form, x: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Stored energy and dissipation since the last step at curvatures x (3,), with numbers p (size,).
+    """Stored energy and dissipation since the last step at curvatures x (3,), and strains, with numbers p (size,).
 
     The stored one is less its quadratic part at rest.
     """
-    rest = 0.5 * (ca.sumsqr(x[1:]) if form.about == BOTH else x[form.about - 1] ** 2)
-    stored, dissipated = -rest, ca.SX(0)
+    stored, dissipated = -0.5 * ca.dot(stiffness(form, p), x[_axes(form)] ** 2), ca.SX(0)
     for weight, strain, z in _fibres(form, x, p):
         kept, lost = _MATERIALS[form.name][0](strain, p, z)
         stored, dissipated = stored + weight * kept, dissipated + weight * lost
     return stored, dissipated
 
 
+def _axes(form: Form) -> list[int]:
+    """Numbers of the curvatures and strains on which a form depends."""
+    return [*((1, 2) if form.about == BOTH else (form.about - 1,)), *range(3, form.arguments)]
+
+
+def stiffness(form: Form, p: ca.SX) -> ca.SX:
+    """Stiffnesses at rest for these: one for curvatures, for the strain along by the weights of all fibres."""
+    bending = ca.SX.ones(len(_axes(form)) - form.strains)
+    if not form.strains:
+        return bending
+    first = CONSTANTS[form.name]
+    return ca.vertcat(bending, ca.sum1(p[first + 1 : first + 1 + form.count]) / p[first] ** 2)
+
+
 def updated(form: Form, x: ca.SX, p: ca.SX) -> ca.SX:
-    """Internal variables (memory,) at the end of a step, at curvatures x (3,), with numbers p (size,)."""
+    """Internal variables (memory,) at the end of a step, at curvatures and strains x, with numbers p (size,)."""
     return ca.vertcat(*[_MATERIALS[form.name][1](strain, p, z, INSIDE) for _, strain, z in _fibres(form, x, p)])
 
 
 def lasting(form: Form, x: ca.SX, p: ca.SX) -> ca.SX:
-    """Inelastic curvatures (3,) at the end of a step: the moments of what fibres have slid or transformed, over the
-    stiffness at rest."""
-    found = ca.SX.zeros(3)
-    axes = (1, 2) if form.about == BOTH else (form.about - 1,)
-    bent = ca.SX.sym("bent", 3)
+    """Inelastic curvatures (3,), and strains, at the end of a step: the moments and forces of what fibres have slid or
+    transformed, over the stiffness at rest."""
+    found, firm = ca.SX.zeros(form.arguments), stiffness(form, p)
+    bent = ca.SX.sym("bent", form.arguments)
     share = 1.0 - p[0] if form.name == "sliders" else p[0]
     for (weight, strain, z), (_, at, _) in zip(_fibres(form, x, p), _fibres(form, bent, p), strict=True):
         now = _MATERIALS[form.name][1](strain, p, z, 0.0)
         # The work of the fibre's strain on each curvature.
         arms = ca.jacobian(at, bent)
-        for axis in axes:
-            found[axis] += weight * share * ca.dot(arms[:, axis], now)
+        for axis, own in zip(_axes(form), ca.vertsplit(firm), strict=True):
+            found[axis] += weight * share * ca.dot(arms[:, axis], now) / own
     return found
 
 
 def _fibres(form: Form, x: ca.SX, p: ca.SX) -> list[tuple[ca.SX, ca.SX, ca.SX]]:
     """Weight, strain and internal variables of each fibre."""
     n, width, places = form.count, form.variables, form.places
-    bent = x[1:] if form.about == BOTH else x[form.about - 1]
-    weights, where, z = CONSTANTS[form.name], CONSTANTS[form.name] + n, form.size - form.memory
+    bent = x[1:3] if form.about == BOTH else x[form.about - 1]
+    weights = CONSTANTS[form.name] + form.strains
+    where, z = weights + n, form.size - form.memory
+    along = x[3] / p[weights - 1] if form.strains else 0.0
     found = []
     for i in range(n):
         # All weights, then all first places, then all second ones.
         place = [p[where + k * n + i] for k in range(places)]
         strain = ca.dot(ca.vertcat(*place), bent) if form.spread else place[0] * bent
-        found.append((p[weights + i], strain, p[z + i * width : z + (i + 1) * width]))
+        found.append((p[weights + i], strain + along, p[z + i * width : z + (i + 1) * width]))
     return found
 
 

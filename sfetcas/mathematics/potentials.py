@@ -8,6 +8,10 @@ deviation of the potential from its quadratic part at rest,
 over a unit of energy per length.  Forms of one bending axis are functions ``w(a)`` of one curvature: of that about b2
 or b3, or of the magnitude of both together, which is meant for sections that are round.
 
+Where a form depends on strains, too, these follow the curvatures in ``x``, over the unit of curvature, so that they are
+lengths in m; what is left out is then the quadratic part without that which couples curvatures with strains, or strains
+with each other.
+
 Sources: Ramberg and Osgood 1943 (NACA TN 902); Audoly and Neukirch 2021 (doi 10.1016/j.jmps.2021.104457) for ribbons,
 whose transverse profile is solved anew in the theory of the documentation.
 """
@@ -36,7 +40,7 @@ STEPS = 12
 
 
 def deviation(form: Form, x: ca.SX, p: ca.SX) -> ca.SX:
-    """The deviation of a form from the quadratic potential at curvatures x (3,), with numbers p (size,).
+    """The deviation of a form from the quadratic potential at curvatures and strains x, with numbers p (size,).
 
     With memory that is the sum of what is stored and of what is dissipated since the last step.
     """
@@ -49,7 +53,9 @@ def deviation(form: Form, x: ca.SX, p: ca.SX) -> ca.SX:
     if form.name == "given":
         function = function_of(form.given)
         own = x if function.numel_in(0) == x.numel() else x[form.about - 1]
-        return _beyond_quadratic(function, own, p)
+        return _beyond_quadratic(function, own, p, form.strains)
+    if form.name == "curve":
+        return _curve(form, x, p)
     square = ca.sumsqr(x[1:]) if form.about == BOTH else x[form.about - 1] ** 2
     if form.name == "table" and not form.odd:
         return _table(x[form.about - 1], p, form.count)
@@ -59,8 +65,8 @@ def deviation(form: Form, x: ca.SX, p: ca.SX) -> ca.SX:
 
 @functools.cache
 def derivatives_of(form: Form) -> ca.Function:
-    """``(x, p) ->`` deviation, its gradient (3,) and second derivatives (3, 3)."""
-    x, p = ca.SX.sym("x", 3), ca.SX.sym("p", form.size)
+    """``(x, p) ->`` deviation, its gradient (n,) and second derivatives (n, n), n curvatures and strains."""
+    x, p = ca.SX.sym("x", form.arguments), ca.SX.sym("p", form.size)
     value = deviation(form, x, p)
     hessian, gradient = ca.hessian(value, x)
     results = [ca.densify(part) for part in (value, gradient, hessian)]
@@ -126,6 +132,51 @@ def _table(a: ca.SX, p: ca.SX, count: int) -> ca.SX:
     return at(a)[0] - at_rest - 0.5 * slope * a**2
 
 
+# -- curves of a material over a section that stretches ----------------------------------------------------
+
+
+def _curve(form: Form, x: ca.SX, p: ca.SX) -> ca.SX:
+    """What fibres store whose stress is linear between kinks, integrated over a rectangle, a circle or a tube.
+
+    Each kink changes the slope of the stress, so that the fibres beyond it store half the change times the square of
+    the strain beyond.  Numbers: reach of the section, inner over outer radius; strains of the kinks, changes of the
+    slope.  Strains are over one unit, so are curvatures times the reach; energy over that of the second moment.
+    """
+    n, strain = form.count, x[3] / p[0]
+    square = ca.sumsqr(x[1:3]) if form.about == BOTH else x[form.about - 1] ** 2
+    total = ca.SX(0)
+    for kink, change in zip(ca.vertsplit(p[2 : 2 + n]), ca.vertsplit(p[2 + n :]), strict=True):
+        middle = ca.sign(kink) * strain - ca.fabs(kink)
+        if form.about == BOTH:
+            beyond = _beyond_in_circle(middle, square) - p[1] ** 2 * _beyond_in_circle(middle, p[1] ** 2 * square)
+        else:
+            beyond = _beyond_in_rectangle(middle, square)
+        total += 0.5 * change * beyond
+    return total / (math.pi / 4.0 * (1.0 - p[1] ** 4) if form.about == BOTH else 2.0 / 3.0)
+
+
+def _beyond_in_rectangle(middle: ca.SX, square: ca.SX) -> ca.SX:
+    """Integral over y in [-1, 1] of the square of ``middle + k y`` where it is positive, from the square of k."""
+    k = ca.sqrt(square + TINY**2)
+    part = ca.if_else(middle > -k, (middle + k) ** 3 / (3.0 * k), 0.0)
+    return ca.if_else(middle >= k, 2.0 * middle**2 + 2.0 / 3.0 * square, part)
+
+
+def _beyond_in_circle(middle: ca.SX, square: ca.SX) -> ca.SX:
+    """The same over the circle of radius 1: with the angle a from the top down to where the integrand begins."""
+    k = ca.sqrt(square + TINY**2)
+    t = -middle / k
+    a = ca.acos(ca.fmax(ca.fmin(t, 1.0 - EDGE), EDGE - 1.0))
+    s, c = ca.sin(a), ca.cos(a)
+    part = 0.25 * (a + s * c * (1.0 - 2.0 * c**2)) - 4.0 / 3.0 * c * s**3 + c**2 * (a - s * c)
+    part = ca.if_else(t < 1.0 - EDGE, (square + TINY**2) * part, 0.0)
+    return ca.if_else(t <= EDGE - 1.0, math.pi * (middle**2 + 0.25 * square), part)
+
+
+EDGE = 1e-6
+"""Share of the radius at the edge of a circle beyond which nothing is taken to be: slopes change by 1e-9 there."""
+
+
 # -- ribbons ---------------------------------------------------------------------------------------------
 
 
@@ -188,8 +239,8 @@ def function_of(text: str) -> ca.Function:
 def text_of(value: Any, size: int = 3) -> str:
     """A function of CasADi, one of Python that makes an expression, or a text with one, as a text.
 
-    It takes ``size`` numbers, three curvatures or one strain, and a list of parameters where it takes two arguments,
-    and gives one number.
+    It takes ``size`` numbers, three curvatures and what strains follow them, or one strain, and a list of parameters
+    where it takes two arguments, and gives one number.
 
     Raises
     ------
@@ -228,7 +279,7 @@ def parameters_of(text: str) -> int:
 def at_rest(text: str, p: Array) -> tuple[Array, Array]:
     """Gradient (3,), N m, and second derivatives (3, 3), N m2, of a given potential at rest, with parameters p (n,).
 
-    Of one strain (1,) and (1, 1), N.
+    Of one strain (1,) and (1, 1), N; of curvatures and strains of both.
     """
     rest = _at_rest(text)
     gradient, hessian = (part.full() for part in rest(values_of(p)))
@@ -247,10 +298,14 @@ def _at_rest(text: str) -> ca.Function:
     return ca.Function("at_rest", [p], found)
 
 
-def _beyond_quadratic(function: ca.Function, x: ca.SX, p: ca.SX) -> ca.SX:
-    """A given potential less its value and its quadratic part at rest."""
+def _beyond_quadratic(function: ca.Function, x: ca.SX, p: ca.SX, strains: int = 0) -> ca.SX:
+    """A given potential less its value and its quadratic part at rest.
+
+    Of the latter what couples strains, the last ones, with others is kept.
+    """
     at = ca.SX.sym("at", x.numel())
     value = function(at, p) if function.n_in() == 2 else function(at)
     hessian = ca.hessian(value, at)[0]
     rest = [ca.substitute(part, at, ca.SX.zeros(x.numel())) for part in (value, hessian)]
-    return ca.substitute(value, at, x) - rest[0] - 0.5 * ca.dot(x, ca.mtimes(rest[1], x))
+    left_out = ca.diagcat(ca.SX.ones(x.numel() - strains, x.numel() - strains), *[1.0] * strains)
+    return ca.substitute(value, at, x) - rest[0] - 0.5 * ca.dot(x, ca.mtimes(rest[1] * left_out, x))

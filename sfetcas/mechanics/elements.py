@@ -256,18 +256,15 @@ class Element(Term):
             return super().rotation_gradient()
         symbols, q, point, load = self._large_symbols()
         strain, tangents, gradient, hessian, *change = self._point.map(self.order + 1)(*point)
-        by_q, basis, gained = self.on_nodes(gradient), self._basis(q), tangents - self._tangent_of(point)
-        matrix = ca.mtimes(basis.T, ca.mtimes(self._between_sides(hessian), basis))
-        # What keeps quaternions on the unit sphere.
-        radial = ca.vec(ca.repmat(ca.sum1(q * by_q), 3, 1))
-        matrix -= 0.25 * ca.diag(ca.vertcat(radial, ca.MX.zeros(basis.shape[1] - radial.shape[0], 1)))
+        gained = tangents - self._tangent_of(point)
+        moments, matrix = self.by_rotation_vectors(q, self._on_sides(gradient), self._between_sides(hessian))
         results = {
             "energy": ca.sum2(strain) + ca.dot(load, gained),
             "stored": ca.sum2(strain),
             "rows": ca.sum2(gained),
-            "gradient": ca.densify(ca.mtimes(basis.T, self._on_sides(gradient))),
-            "stiffness": ca.densify(matrix),
-            "rotation_jacobian": ca.densify(ca.mtimes(self._by_sides(change), basis)),
+            "gradient": moments,
+            "stiffness": matrix,
+            "rotation_jacobian": ca.densify(ca.mtimes(self._by_sides(change), self._basis(q))),
         }
         return self._function("rotation_gradient", symbols, results)
 
@@ -364,60 +361,70 @@ class Element(Term):
         names = [*ARGUMENTS, "weight"][: len(arguments)]
         return ca.Function(f"{name}_{name_of(self)}", arguments, list(results.values()), names, list(results))
 
-    def point_energy(self, name: str, energy: Callable[[ca.SX, ca.SX], ca.SX], width: int, wanted: str) -> ca.Function:
-        """The energy of one point in space from the change of the curvature there, with its derivatives.
+    def point_energy(
+        self, name: str, energy: Callable[[ca.SX, ca.SX, ca.SX], ca.SX], width: int, wanted: str
+    ) -> ca.Function:
+        """The energy of one point in space from the change of the curvature and the strain there, with its derivatives.
 
         Parameters
         ----------
         name : str
             Of the function.
         energy : callable
-            (change of the curvature times length (3,), fixed axes of the undeformed scene; data (width,)) -> energy.
+            (change of the curvature times length (3,), fixed axes of the undeformed scene; scaled strains (3,), or none
+            where there are none; data (width,)) -> energy.
         wanted : str
             ``gradient``, ``hessian`` or ``both``; the other one is empty.
 
         Returns
         -------
         Function
-            ``(rotation, slope, data) ->`` energy, gradient (8,) and second derivatives (8, 8) by rotation and slope.
+            ``(rotation, slope, strain, data) ->`` energy, gradient and second derivatives by rotation, slope and
+            strain, (8,) and (8, 8) or (11,) and (11, 11).
         """
         here, slope, data = ca.SX.sym("here", 4), ca.SX.sym("slope", 4), ca.SX.sym("data", width)
-        value = energy(self.curvature(here, slope), data)
-        hessian, gradient = ca.hessian(value, ca.vertcat(here, slope))
+        strain = ca.SX.sym("strain", 3 * self.strains)
+        value = energy(self.curvature(here, slope), strain, data)
+        hessian, gradient = ca.hessian(value, ca.vertcat(here, slope, strain))
         results = [
             value,
             ca.SX(0, 1) if wanted == "hessian" else gradient,
             ca.SX(0, 0) if wanted == "gradient" else hessian,
         ]
-        return ca.Function(name, [here, slope, data], [ca.densify(part) for part in results], {"cse": True})
+        symbols = [here, slope, strain, data]
+        return ca.Function(name, symbols, [ca.densify(part) for part in results], {"cse": True})
 
-    def summed(self, function: ca.Function, q: ca.MX, data: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
-        """Sum over the points of a function as of :meth:`point_energy`, with its derivatives by the nodes.
+    def summed(self, function: ca.Function, q: ca.MX, u: ca.MX, data: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """Sum over the points of a function as of :meth:`point_energy`, with its derivatives by the sides.
 
         Parameters
         ----------
         function : Function
         q : (4, p + 1), rotations of the nodes
+        u : (3, p + 1) or nothing, scaled strains of the points
         data : (m, p + 1), a column for each point
 
         Returns
         -------
-        energy, its gradient (4, p + 1) and its second derivatives (4 (p + 1), 4 (p + 1)) by the rotations of the nodes
+        energy, its gradient (n,) and its second derivatives (n, n) by the rotations of the nodes, then by the strains
         """
-        energies, gradient, hessian = function.map(self.order + 1)(*self.at(q), data)
-        by_nodes = self.on_nodes(gradient) if gradient.numel() else ca.MX(4, 0)
-        return ca.sum2(energies), by_nodes, self.between_nodes(hessian) if hessian.numel() else ca.MX(0, 0)
+        energies, gradient, hessian = function.map(self.order + 1)(*self.at(q), u, data)
+        by_sides = self._on_sides(gradient) if gradient.numel() else ca.MX(0, 1)
+        return ca.sum2(energies), by_sides, self._between_sides(hessian) if hessian.numel() else ca.MX(0, 0)
 
     def by_rotation_vectors(self, q: ca.MX, gradient: ca.MX, hessian: ca.MX | None) -> tuple[ca.MX, ca.MX]:
-        """Derivatives as of :meth:`summed` by rotation vectors about the fixed axes: (3 (p + 1),), and that squared.
+        """Derivatives as of :meth:`summed` by rotation vectors about the fixed axes, then by the strains.
 
         Of unit quaternions, as :func:`~sfetcas.mechanics.terms.rotation_gradient` says; no second ones for None.
         """
-        basis = self.basis(q)
-        moments = ca.densify(ca.mtimes(basis.T, ca.vec(gradient)))
+        basis = self._basis(q)
+        moments = ca.densify(ca.mtimes(basis.T, gradient))
         if hessian is None:
             return moments, ca.MX(0, 0)
-        radial = ca.diag(ca.vec(ca.repmat(ca.sum1(q * gradient), 3, 1)))
+        # What keeps quaternions on the unit sphere.
+        by_nodes = ca.reshape(gradient[: q.numel()], *q.shape)
+        radial = ca.vec(ca.repmat(ca.sum1(q * by_nodes), 3, 1))
+        radial = ca.diag(ca.vertcat(radial, ca.MX.zeros(basis.shape[1] - radial.shape[0], 1)))
         return moments, ca.densify(ca.mtimes(basis.T, ca.mtimes(hessian, basis)) - 0.25 * radial)
 
     @functools.cached_property

@@ -18,13 +18,14 @@ from ..description.records import enumerated
 from ..description.tendons import Stretch
 from ..mathematics import curves, quaternion
 from ..mathematics.arrays import Array, first_of_largest, values_of
+from ..mathematics.forms import BOTH
 from ..mathematics.interpolation import differentiation, evaluation
 from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
 from .balance import three as _three
 from .batches import GroupBatch
 from .equations import Equations, State, gained_tangents, scaled_strains, turned_points, turned_tangents, yielded
-from .laws import curvature_by_moment, law_of, least_stiffness
+from .laws import curvature_by_moment, form_of, law_of, least_stiffness
 from .loading import Loading
 from .magnetism import magnet_terms
 from .memory import dissipated_along
@@ -192,9 +193,9 @@ class Fields:
             # Moments are no function of curvatures: those of the elements themselves are told.
             strain = self._changes(member, x)
         elif section.law is not None:
-            axes = [0, 1, 2] if model.space else [line.bending_axis - 1]
-            near = self._changes(member, x)
-            strain = curvature_by_moment(model.scene, member, x, strain, near, axes)
+            near, axes = self._near(member, x)
+            acting = np.concatenate([strain, forces], axis=1)[:, : near.shape[1]]
+            strain, along = np.split(curvature_by_moment(model.scene, member, x, acting, near, axes), [3], axis=1)
         elif section.coupled and model.space:
             strain = np.einsum("nij,nj->ni", section.compliance_matrix(x), strain)
         else:
@@ -204,23 +205,40 @@ class Fields:
         result["curvature"] = line.curvatures(x) + self.natural(member, x) + strain
         if yields:
             result["strain"] = np.einsum("nij,nj->ni", section.compliance_of_forces(x), forces) - branches[1]
+            form = form_of(model.scene, member)
             if section.stretch_law is not None:
-                near = self._strains_along(member, x)
+                near = self._strains(member, x)[:, 0]
                 result["strain"][:, 0] = strain_by_force(model.scene, member, x, forces[:, 0], near)
+            elif form is not None and form.strains:
+                own = self._strains(member, x) if form.remembers else along
+                result["strain"][:, : form.strains] = own[:, : form.strains]
         if section.shifted:
             result["strain"] += np.einsum("nij,nj->ni", arms, strain)
         return result
 
-    def _strains_along(self, member: str, x: Array) -> Array:
-        """Strain along (n,) as the points of the elements say at fractions x."""
+    def _strains(self, member: str, x: Array) -> Array:
+        """Strains along b1, b2, b3 (n, 3) as the points of the elements say at fractions x."""
         model, part = self.model, self.model.elements_of(member)
         cuts, weight = model.mesh.cuts[member], model.beams.weight[part]
         there = cuts[:-1, None] + np.diff(cuts)[:, None] * model.element.points
         section = model.scene.sections[str(model.scene.members[member].section)]
-        compliance = section.compliance(there.ravel())[:, 0].reshape(there.shape) * model.scales.force
-        at = self._stations(member, x)
-        own = scaled_strains(model, self.state.y)[part][:, :, 0] * np.sqrt(compliance / weight)
-        return np.asarray(np.einsum("np,np->n", at.at_points, own[at.elements]))
+        axes = model.scene.center_lines[member].strained_axes(model.space)
+        compliance = section.compliance(there.ravel())[:, axes].reshape(*there.shape, -1) * model.scales.force
+        at, found = self._stations(member, x), np.zeros((len(x), 3))
+        own = scaled_strains(model, self.state.y)[part] * np.sqrt(compliance / weight[..., None])
+        found[:, axes] = np.einsum("np,npa->na", at.at_points, own[at.elements])
+        return found
+
+    def _near(self, member: str, x: Array) -> tuple[Array, list[int]]:
+        """Changes of curvatures (n, 3), 1/m, and behind them the strains on which the law of a member's section
+        depends, as elements say at fractions x; and the numbers of those that the scene may change.
+        """
+        form, line, space = form_of(self.model.scene, member), self.model.scene.center_lines[member], self.model.space
+        count, near = 0 if form is None else form.strains, self._changes(member, x)
+        axes = [0, 1, 2] if space else [line.bending_axis - 1]
+        if count:
+            near = np.concatenate([near, self._strains(member, x)[:, :count]], axis=1)
+        return near, axes + [3 + i for i in line.strained_axes(space) if i < count]
 
     def _branches(self, member: str, x: Array) -> tuple[Array, Array]:
         """Moments (n, 3), N m, about b1, b2, b3 of what has not yet relaxed, and strains (n, 3) by such forces."""
@@ -339,7 +357,7 @@ class Fields:
     @functools.cached_property
     def dissipated(self) -> dict[str, float]:
         """What each member whose law has memory has dissipated since it was undeformed, J."""
-        return dissipated_along(self.model, self.q)
+        return dissipated_along(self.model, self.q, self.state.y)
 
     @property
     def spent(self) -> float:
@@ -705,9 +723,11 @@ class Fields:
             spin = np.pad(slope, ((0, 0), (2, 0)))
         return np.einsum("nij,ni->nj", quaternion.matrix(line.quaternions(x)), spin)
 
-    def changes(self, member: str, x: Array) -> Array:
-        """Changes (n, 3) of twist and of the curvatures about b2 and b3, 1/m, of the elements at fractions x (n,)."""
-        return self._changes(member, x)
+    def near(self, member: str, x: Array) -> Array:
+        """Changes (n, 3) of twist and of the curvatures about b2 and b3, 1/m, of the elements at fractions x (n,), and
+        behind them the strains on which the law of a member's section depends.
+        """
+        return self._near(member, x)[0]
 
     def _frames(self, member: str, x: Array, rotation: Array) -> Array:
         """Section axes as columns, (n, 3, 3)."""
@@ -818,12 +838,19 @@ class Fields:
             section = scene.sections[str(scene.members[name].section)]
             nodes = model.along(name)
             x = np.sort(np.concatenate([nodes, 0.5 * (nodes[1:] + nodes[:-1])]))
-            change = self.along(name, x)["curvature"] - line.curvatures(x)
-            low, high = law.reach(section, x).T
-            bent = change[:, law.form.about - 1] if law.form.about else np.hypot(change[:, 1], change[:, 2])
+            along, form = self.along(name, x), law.form_in(section)
+            change = along["curvature"] - line.curvatures(x)
+            bent = change[:, form.about - 1] if form.about else np.hypot(change[:, 1], change[:, 2])
+            law_name = f"the law {law.type!r} of section {str(scene.members[name].section)!r}"
+            if form.strains:
+                centre = section.arms(x) if section.shifted else np.zeros((len(x), 3, 3))
+                strain = along["strain"] - np.einsum("nij,nj->ni", centre, change)
+                change = np.concatenate([change, strain[:, : form.strains]], axis=1)
+                found += _beyond_fibres(law, section, x, strain[:, 0], bent, f"{law_name} ends", name)
+            # Where the section stretches it is the strain of fibres that ends a law.
+            low, high = (np.full(len(x), end) for end in law.span) if form.strains else law.reach(section, x).T
             over = np.maximum(bent - high, low - bent)
             i = int(np.argmax(over))
-            law_name = f"the law {law.type!r} of section {str(scene.members[name].section)!r}"
             if over[i] > tolerances.WRITTEN * max(abs(low[i]), abs(high[i])):
                 end = high[i] if bent[i] > high[i] else low[i]
                 found.append(
@@ -831,7 +858,7 @@ class Fields:
                     f"at {x[i]:.3g} of its length: beyond the end the law is a guess, with the slope there"
                 )
             slack = law.slack(section, x, change)
-            i = first_of_largest(slack)
+            i = first_of_largest(np.maximum(slack, 0.0))
             # A gap keeps rounding from deciding.
             if slack[i] > tolerances.ALIKE:
                 found.append(
@@ -841,14 +868,14 @@ class Fields:
                 )
             if law.convex:
                 continue
-            axes = [0, 1, 2] if model.space else [line.bending_axis - 1]
-            least = least_stiffness(scene, name, x, change, axes)
+            least = least_stiffness(scene, name, x, change, self._near(name, x)[1])
             i = int(np.argmin(least))
             if least[i] < 0.0:
-                where = ", ".join(f"{entry:.4g}" for entry in change[i])
+                where, more = (", ".join(f"{entry:.4g}" for entry in part) for part in (change[i, :3], change[i, 3:]))
+                strained = f" and strains of ({more})" if more else ""
                 found.append(
-                    f"{law_name} is not convex at changes of the curvatures of ({where}) 1/m, as of member {name!r} at "
-                    f"{x[i]:.3g} of its length: a finer mesh may find other shapes there"
+                    f"{law_name} is not convex at changes of the curvatures of ({where}) 1/m{strained}, as of member "
+                    f"{name!r} at {x[i]:.3g} of its length: a finer mesh may find other shapes there"
                 )
         return tuple(found)
 
@@ -863,7 +890,7 @@ class Fields:
             strain = self.along(name, x)["strain"][:, 0]
             where = f"the law of stretch {law.type!r} of section {str(scene.members[name].section)!r}"
             over = np.maximum(strain - high, low - strain)
-            i = first_of_largest(over)
+            i = first_of_largest(np.maximum(over, 0.0))
             if over[i] > tolerances.WRITTEN * max(abs(low), abs(high)):
                 end = high if strain[i] > high else low
                 found.append(
@@ -943,6 +970,24 @@ class Fields:
             # them.
             moments[:-1] = -self.balance.starting_moments(part) - _cross(self.turned[part, 0], strings)
         return np.asarray(moments)
+
+
+def _beyond_fibres(law: Any, section: Any, x: Array, strain: Array, bent: Array, ends: str, member: str) -> list[str]:
+    """A sentence where a fibre of a section that stretches is strained further than its law is known."""
+    form, (low, high) = law.form_in(section), law.fibre_span
+    if not np.isfinite(high):
+        return []
+    reach = section.fibres(x)[:, 2 if form.about == BOTH else form.about - 1] * np.abs(bent)
+    over = np.maximum(strain + reach - high, low - strain + reach)
+    i = first_of_largest(np.maximum(over, 0.0))
+    if not over[i] > tolerances.WRITTEN * max(abs(low), abs(high)):
+        return []
+    above = strain[i] + reach[i] - high == over[i]
+    end, there = (high, strain[i] + reach[i]) if above else (low, strain[i] - reach[i])
+    return [
+        f"{ends} at a strain of {end:.6g}, and a fibre of member {member!r} has {there:.6g} at {x[i]:.3g} of its "
+        "length: beyond the end the law is a guess, with the slope there"
+    ]
 
 
 def _summed(at: Stations, starts: Array, gained: Array) -> Array:

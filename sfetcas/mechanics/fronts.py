@@ -12,7 +12,7 @@ from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, values_of
 from ..mathematics.forms import BOTH, Form
-from ..mathematics.hysteresis import lasting
+from ..mathematics.hysteresis import lasting, stiffness
 from ..mathematics.potentials import derivatives_of
 from .fields import Fields, rotations_along
 from .laws import law_of
@@ -30,17 +30,19 @@ LINEAR = 2
 
 
 def front_errors(fields: Fields) -> tuple[Array, Array, Array]:
-    """What each element may turn too much or too little, (elements, 3), rad, about the axes of its section.
+    """What each element may turn too much or too little, (elements, 3), rad, about the axes of its section; in a fourth
+    column by how much it may be too long or too short, over the size of the scene.
 
     And the present stiffness of the element over that at rest, (elements,): the harmonic mean over its points; and by
     which share of it stiffnesses at its points differ, (elements,), zero where no front crosses it.
 
     The curvature of an element is smooth; where a front crosses it that of the member has a kink.  Two estimates are
     added: the inelastic curvature at which the law gives the moments by balance, less that of the element; and the
-    highest Legendre coefficients of the latter, which say what integration at the points leaves.
+    highest Legendre coefficients of the latter, which say what integration at the points leaves.  The same is said of
+    the strain along where the law depends on it.
     """
     model = fields.model
-    found, points = np.zeros((len(model.beams.weight), 3)), model.element.points
+    found, points = np.zeros((len(model.beams.weight), 4)), model.element.points
     present, mixed = np.ones(len(found)), np.zeros(len(found))
     degree = len(points) - 1
     coefficients = np.linalg.inv(legendre.legvander(2.0 * points - 1.0, degree))
@@ -53,15 +55,15 @@ def front_errors(fields: Fields) -> tuple[Array, Array, Array]:
         cuts = model.mesh.cuts[name]
         x = (cuts[:-1, None] + np.diff(cuts)[:, None] * points).ravel()
         own, balanced, soft = _inelastic(fields, name, x)
-        shape = (len(cuts) - 1, len(points), 3)
+        shape = (len(cuts) - 1, len(points), own.shape[1])
         turned = np.diff(cuts)[:, None] * line.length
         rough = np.linalg.norm(np.einsum("tp,npa->nta", tails, own.reshape(shape)), axis=1)
         apart = np.einsum("p,npa->na", model.element.weights, np.abs(balanced - own).reshape(shape))
-        found[part] = turned * (rough + apart)
+        found[part, : shape[2]] = turned * (rough + apart)
         soft = soft.reshape(shape[:2])
         present[part] = 1.0 / ((1.0 / soft) @ model.element.weights)
         mixed[part] = 1.0 - soft.min(axis=1) / soft.max(axis=1)
-    return found, present, mixed
+    return found / [1.0, 1.0, 1.0, model.scene.size], present, mixed
 
 
 def section_axes(fields: Fields, member: str, x: Array) -> Array:
@@ -74,12 +76,14 @@ def section_axes(fields: Fields, member: str, x: Array) -> Array:
 
 @functools.cache
 def _lasting(form: Form) -> ca.Function:
-    x, p = ca.SX.sym("x", 3), ca.SX.sym("p", form.size)
-    return ca.Function(f"lasting_{form}", [x, p], [ca.densify(lasting(form, x, p))], {"cse": True})
+    x, p = ca.SX.sym("x", form.arguments), ca.SX.sym("p", form.size)
+    results = [ca.densify(lasting(form, x, p)), stiffness(form, p)]
+    return ca.Function(f"lasting_{form}", [x, p], results, {"cse": True})
 
 
 def _inelastic(fields: Fields, member: str, x: Array) -> tuple[Array, Array, Array]:
-    """Inelastic curvatures (n, 3), 1/m, at the points of all elements: of the elements, and of the moments by balance.
+    """Inelastic curvatures (n, 3), 1/m, and behind them strains where the law depends on them, at the points of all
+    elements: of the elements, and of the moments and forces by balance.
 
     And the least of the slopes of the moments of the elements over those at rest, (n,).
 
@@ -88,41 +92,55 @@ def _inelastic(fields: Fields, member: str, x: Array) -> tuple[Array, Array, Arr
     model = fields.model
     section, law = model.scene.sections[str(model.scene.members[member].section)], law_of(model.scene, member)
     assert law is not None
-    form, values = law.form, values_of(law.values(section, x))
+    form, values = law.form_in(section), values_of(law.values(section, x))
     memory = model.mesh.memory or {}
     if member in memory:
         values[:, values.shape[1] - form.memory :] = memory[member].variables.reshape(len(x), -1)
     unit, bent, p = values[:, 0], values[:, 1], values[:, 2:]
-    axes = [1, 2] if form.about == BOTH else [form.about - 1]
-    here = np.zeros((len(x), 3))
-    here[:, axes] = fields.changes(member, x)[:, axes] / bent[:, None]
-    moments = fields.along(member, x, dimensionless=True)["moment"] * model.scales.moment
-    acting = np.einsum("nij,ni->nj", section_axes(fields, member, x), moments) * (bent / unit)[:, None]
-    there = _curvatures(form, here, acting, p, axes)
+    axes = [*([1, 2] if form.about == BOTH else [form.about - 1]), *range(3, form.arguments)]
     function = _lasting(form).map(len(x))
-    own, balanced = (np.array(function(each.T, p.T)).T * bent[:, None] for each in (here, there))
-    hessian = np.array(derivatives_of(form).map(len(x))(here.T, p.T)[2]).T.reshape(-1, 3, 3)[:, axes][:, :, axes]
+    here = np.zeros((len(x), form.arguments))
+    here[:, axes] = fields.near(member, x)[:, axes] / bent[:, None]
+    found = fields.along(member, x, dimensionless=True)
+    acting = np.concatenate([found["moment"] * model.scales.moment, found["force"] * model.scales.force], axis=1)
+    about = section_axes(fields, member, x)
+    acting = np.einsum("nij,nki->nkj", about, acting.reshape(-1, 2, 3)).reshape(-1, 6)
+    if section.shifted:
+        acting[:, :3] += np.einsum("nji,nj->ni", section.arms(x), acting[:, 3:])
+    acting = acting[:, : form.arguments]
+    firm = np.array(function(here.T, p.T)[1]).T
+    there = _curvatures(form, here, acting * (bent / unit)[:, None], p, axes, firm)
+    own, balanced = (np.array(function(each.T, p.T)[0]).T * bent[:, None] for each in (here, there))
+    hessian = _scaled(np.array(derivatives_of(form).map(len(x))(here.T, p.T)[2]), axes, firm)
     return own, balanced, np.linalg.eigvalsh(hessian + np.eye(len(axes)))[:, 0]
 
 
-def _curvatures(form: Form, near: Array, moments: Array, p: Array, axes: list[int]) -> Array:
-    """Curvatures (n, 3) at which a form gives moments (n, 3), both dimensionless, about given axes.
+def _scaled(hessian: Array, axes: list[int], firm: Array) -> Array:
+    """Second derivatives of points beside each other, by what has the stiffnesses at rest (n, m), over these."""
+    size, unit = len(hessian), np.sqrt(firm)
+    chosen = hessian.T.reshape(-1, size, size)[:, axes][:, :, axes]
+    return np.asarray(chosen / unit[:, :, None] / unit[:, None, :])
 
-    By Newton's method downhill on the convex potential less the work of the moments, from curvatures ``near``.
+
+def _curvatures(form: Form, near: Array, moments: Array, p: Array, axes: list[int], firm: Array) -> Array:
+    """Curvatures and strains (n, k) at which a form gives moments and forces (n, k), all dimensionless, about axes.
+
+    By Newton's method downhill on the convex potential less the work of the moments, from curvatures ``near``; with the
+    stiffnesses at rest (n, axes) of these.
     """
     here, derivatives = near.copy(), derivatives_of(form)
-    active = np.arange(len(near))
+    # Over what stores one half at rest.
+    active, root = np.arange(len(near)), np.sqrt(firm)
 
     def at(x: Array, which: Array) -> tuple[Array, Array, Array]:
         value, gradient, hessian = derivatives.map(len(which))(x.T, p[which].T)
-        value = np.array(value).ravel() + 0.5 * (x[:, axes] ** 2).sum(axis=1)
-        value -= (moments[which][:, axes] * x[:, axes]).sum(axis=1)
-        miss = moments[which][:, axes] - np.array(gradient).T[:, axes] - x[:, axes]
-        slope = np.array(hessian).T.reshape(-1, 3, 3)[:, axes][:, :, axes] + np.eye(len(axes))
-        return value, miss, slope
+        scaled, work = x[:, axes] * root[which], moments[which][:, axes] * x[:, axes]
+        value = np.array(value).ravel() + 0.5 * (scaled**2).sum(axis=1) - work.sum(axis=1)
+        miss = (moments[which][:, axes] - np.array(gradient).T[:, axes]) / root[which] - scaled
+        return value, miss, _scaled(np.array(hessian), axes, firm[which]) + np.eye(len(axes))
 
     value, miss, slope = at(here, active)
-    size = np.abs(moments).max(initial=1.0)
+    size = np.abs(moments[:, axes] / root).max(initial=1.0)
     for _ in range(NEWTON_STEPS):
         off = np.abs(miss).max(axis=1) > tolerances.DECIMAL * size
         active, value, miss, slope = active[off], value[off], miss[off], slope[off]
@@ -132,7 +150,7 @@ def _curvatures(form: Form, near: Array, moments: Array, p: Array, axes: list[in
         fall = (miss * step).sum(axis=1)
         while True:
             trial = here[active]
-            trial[:, axes] += share[:, None] * step
+            trial[:, axes] += share[:, None] * step / root[active]
             there = at(trial, active)
             bad = (there[0] > value - 0.1 * share * fall + tolerances.DECIMAL * np.abs(value)) & (share > SHORTEST)
             if not bad.any():

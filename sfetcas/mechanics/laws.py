@@ -6,6 +6,9 @@ An element has the stiffness of its section at rest.  Where that has a law, a te
 
 with the changes of the curvature ``kappa`` about the axes of the section, which are those of the element itself.  In
 numbers ``kappa`` is over a unit of curvature of the law, and ``d`` over its unit of energy per length.
+
+Where a law depends on strains, too, ``W`` is that of curvatures and strains, which are those of the element, the scaled
+ones of its points times ``(compliance / (weight length))^1/2``; also these are over the unit of curvature.
 """
 
 from __future__ import annotations
@@ -22,7 +25,7 @@ from .. import tolerances
 from ..description.laws import SectionLaw
 from ..description.scene import Scene
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, Index, numbers
+from ..mathematics.arrays import TINY, Array, Index, numbers
 from ..mathematics.forms import Form
 from ..mathematics.hysteresis import energies, updated
 from ..mathematics.potentials import derivatives_of, deviation
@@ -34,6 +37,7 @@ __all__ = [
     "AlongElement",
     "bent_by",
     "curvature_by_moment",
+    "form_of",
     "law_data",
     "law_of",
     "laws_in",
@@ -42,7 +46,7 @@ __all__ = [
 ]
 
 PLACE = 10
-"""Numbers of a point in space before those of the form: energy, nine of the axes over the unit of curvature."""
+"""Numbers of a point in space before those of strains: energy, nine of the axes over the unit of curvature."""
 
 
 @final
@@ -52,7 +56,7 @@ class AlongElement(Term):
 
     Data of each point: weight times length times the unit of energy; one over length and the unit of curvature, times
     the axes b1, b2, b3 in the undeformed scene (in space), or the sign of the axis about which it bends (in the plane);
-    the numbers of the form.
+    strains over the unit of curvature and the scaled ones; the numbers of the form.
 
     Attributes
     ----------
@@ -75,34 +79,52 @@ class AlongElement(Term):
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """The rotations of the element; data of its points."""
-        return self.nodes, 0, 0, self.nodes * self.width, 0
+        """The rotations of the element, and the places with the strains of its points; data of its points."""
+        return self.nodes, self.nodes if self.form.strains else 0, 0, self.nodes * self.width, 0
 
     @property
     def width(self) -> int:
         """Numbers of one point."""
-        return (PLACE if self.space else 2) + self.form.size
+        return self._place + len(self.strained) + self.form.size
+
+    @property
+    def _place(self) -> int:
+        return PLACE if self.space else 2
+
+    @property
+    def strained(self) -> tuple[int, ...]:
+        """Numbers of the strains, those along b1, b2, b3, on which it depends; in the plane without that across it."""
+        inside = (0, 1, 2) if self.space else (0, 4 - self.axis)
+        return inside[: self.form.strains]
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """Sum over the points."""
-        points = ca.reshape(data, self.width, self.nodes)
-        bent = self._element.changes(q)
-        return sum((self._at(bent[k], points[:, k]) for k in range(self.nodes)), ca.SX(0))
+        return sum((self._at(*point) for point in self._points(q, u, data)), ca.SX(0))
 
-    def bending(self, bent: ca.SX, point: ca.SX) -> ca.SX:
-        """Change of twist and curvatures (3,) over the unit of curvature, from that times length in the fixed axes."""
+    def _points(self, q: list[Side], u: list[Side], data: ca.SX) -> list[tuple[ca.SX, ca.SX, ca.SX]]:
+        """Change of the curvature times length, scaled strains and data of each point."""
+        points, bent = ca.horzsplit(ca.reshape(data, self.width, self.nodes)), self._element.changes(q)
+        strains = [ca.vertcat(*side) for side in u] or [ca.SX(0, 1)] * self.nodes
+        return list(zip(bent, strains, points, strict=True))
+
+    def bending(self, bent: ca.SX, strain: ca.SX, point: ca.SX) -> ca.SX:
+        """Change of twist and curvatures (3,) over the unit of curvature, from that times length in the fixed axes;
+        then the strains over that unit.
+        """
+        found = ca.SX.zeros(self.form.arguments)
         if self.space:
-            return ca.mtimes(ca.reshape(point[1:PLACE], 3, 3).T, bent)
-        found = ca.SX.zeros(3)
-        found[self.axis - 1] = point[1] * bent
+            found[:3] = ca.mtimes(ca.reshape(point[1:PLACE], 3, 3).T, bent)
+        else:
+            found[self.axis - 1] = point[1] * bent
+        for i, component in enumerate(self.strained):
+            found[3 + component] = point[self._place + i] * strain[i]
         return found
 
     def stored(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """What is stored: with memory the energy without what a step dissipates."""
         if not self.form.remembers:
             return self.energy(q, u, data, load)
-        points, bent = ca.reshape(data, self.width, self.nodes), self._element.changes(q)
-        return sum((self._stored_at(bent[k], points[:, k]) for k in range(self.nodes)), ca.SX(0))
+        return sum((self._stored_at(*point) for point in self._points(q, u, data)), ca.SX(0))
 
     @property
     def memory(self) -> int:
@@ -116,25 +138,24 @@ class AlongElement(Term):
 
     def remembered(self) -> ca.Function:
         """As :meth:`.Term.remembered`."""
-        sizes = {"q": (self.components, self.nodes), "u": (self.axes, 0), "data": (self.sizes[3], 1)}
+        sizes = {"q": (self.components, self.nodes), "u": (self.axes, self.sizes[1]), "data": (self.sizes[3], 1)}
         symbols = [ca.SX.sym(name, *size) for name, size in (sizes | {"load": (0, 1), "lam": (0, 1)}).items()]
-        bent = self._element.changes([ca.vertsplit(symbols[0][:, i]) for i in range(self.nodes)])
-        points = ca.horzsplit(ca.reshape(symbols[2], self.width, self.nodes))
+        q, u = ([ca.vertsplit(side) for side in ca.horzsplit(part)] if part.shape[1] else [] for part in symbols[:2])
         variables, spent = [], ca.SX(0)
-        for change, point in zip(bent, points, strict=True):
-            x, own = self.bending(change, point), point[self.width - self.form.size :]
+        for bent, strain, point in self._points(q, u, symbols[2]):
+            x, own = self.bending(bent, strain, point), point[self.width - self.form.size :]
             variables.append(updated(self.form, x, own))
             spent += point[0] * energies(self.form, x, own)[1]
         results = [ca.densify(part) for part in (ca.vertcat(*variables), spent)]
         return ca.Function(f"remembered_{name_of(self)}", symbols, results, [*ARGUMENTS], ["z", "spent"], {"cse": True})
 
-    def _stored_at(self, bent: ca.SX, point: ca.SX) -> ca.SX:
+    def _stored_at(self, bent: ca.SX, strain: ca.SX, point: ca.SX) -> ca.SX:
         own = point[self.width - self.form.size :]
-        return point[0] * energies(self.form, self.bending(bent, point), own)[0]
+        return point[0] * energies(self.form, self.bending(bent, strain, point), own)[0]
 
-    def _at(self, bent: ca.SX, point: ca.SX) -> ca.SX:
+    def _at(self, bent: ca.SX, strain: ca.SX, point: ca.SX) -> ca.SX:
         own = point[self.width - self.form.size :]
-        return point[0] * deviation(self.form, self.bending(bent, point), own)
+        return point[0] * deviation(self.form, self.bending(bent, strain, point), own)
 
     # -- derivatives: in space those of one point, mapped over the points, as of the element -------------
 
@@ -142,16 +163,17 @@ class AlongElement(Term):
         """As :meth:`.Term.rotation_gradient`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().rotation_gradient()
-        symbols, q, points = self._large_symbols(5)
-        energy, by_nodes, hessian = self._element.summed(self._point("both"), q, points)
-        gradient, stiffness = self._element.by_rotation_vectors(q, by_nodes, hessian)
-        nothing = ca.MX(0, 1), ca.MX(0, 3 * self.nodes)
+        symbols, *point = self._large_symbols(5)
+        energy, by_sides, hessian = self._element.summed(self._point("both"), *point)
+        gradient, stiffness = self._element.by_rotation_vectors(point[0], by_sides, hessian)
+        nothing = ca.MX(0, 1), ca.MX(0, gradient.shape[0])
         stored = energy
         if self.form.remembers:
-            given = [ca.SX.sym(name, size) for name, size in (("here", 4), ("slope", 4), ("data", self.width))]
-            at_point = self._stored_at(self._element.curvature(*given[:2]), given[2])
+            sizes = {"here": 4, "slope": 4, "strain": point[1].shape[0], "data": self.width}
+            given = [ca.SX.sym(name, size) for name, size in sizes.items()]
+            at_point = self._stored_at(self._element.curvature(*given[:2]), *given[2:])
             function = ca.Function(f"stored_{name_of(self)}", given, [at_point], {"cse": True})
-            stored = ca.sum2(function.map(self.nodes)(*self._element.at(q), points))
+            stored = ca.sum2(function.map(self.nodes)(*self._element.at(point[0]), *point[1:]))
         results = [energy, stored, nothing[0], gradient, stiffness, nothing[1]]
         names = ["energy", "stored", "rows", "gradient", "stiffness", "rotation_jacobian"]
         return ca.Function(f"rotation_gradient_{name_of(self)}", symbols, results, [*ARGUMENTS], names)
@@ -160,9 +182,9 @@ class AlongElement(Term):
         """As :meth:`.Term.rotation_forces`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().rotation_forces()
-        symbols, q, points = self._large_symbols(5)
-        by_nodes = self._element.summed(self._point("gradient"), q, points)[1]
-        gradient = self._element.by_rotation_vectors(q, by_nodes, None)[0]
+        symbols, *point = self._large_symbols(5)
+        by_sides = self._element.summed(self._point("gradient"), *point)[1]
+        gradient = self._element.by_rotation_vectors(point[0], by_sides, None)[0]
         results = [ca.MX(0, 1), gradient]
         return ca.Function(f"forces_{name_of(self)}", symbols, results, [*ARGUMENTS], ["rows", "gradient"])
 
@@ -170,39 +192,47 @@ class AlongElement(Term):
         """As :meth:`.Term.slopes`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().slopes()
-        symbols, q, points = self._large_symbols(4)
-        by_nodes = self._element.summed(self._point("gradient"), q, points)[1]
-        results = [ca.densify(ca.vec(by_nodes)), ca.MX(0, 4 * self.nodes)]
+        symbols, *point = self._large_symbols(4)
+        by_sides = self._element.summed(self._point("gradient"), *point)[1]
+        results = [ca.densify(by_sides), ca.MX(0, by_sides.shape[0])]
         return ca.Function(f"slopes_{name_of(self)}", symbols, results, [*ARGUMENTS[:4]], ["gradient", "jacobian"])
 
     def curvatures(self) -> ca.Function:
         """As :meth:`.Term.curvatures`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().curvatures()
-        symbols, q, points = self._large_symbols(5)
+        symbols, *point = self._large_symbols(5)
         weight = ca.MX.sym("weight")
-        hessian = weight * self._element.summed(self._point("hessian"), q, points)[2]
+        hessian = weight * self._element.summed(self._point("hessian"), *point)[2]
         given = [*ARGUMENTS, "weight"]
         return ca.Function(f"curvatures_{name_of(self)}", [*symbols, weight], [hessian], given, ["hessian"])
 
-    def _large_symbols(self, count: int) -> tuple[list[ca.MX], ca.MX, ca.MX]:
-        """The first arguments of functions put together of others, the rotations, and data of the points."""
-        sizes = {"q": (4, self.nodes), "u": (3, 0), "data": (self.sizes[3], 1), "load": (0, 1), "lam": (0, 1)}
+    def _large_symbols(self, count: int) -> tuple[list[ca.MX], ca.MX, ca.MX, ca.MX]:
+        """The first arguments of functions put together of others, rotations, and strains and data of the points."""
+        u = (3, self.sizes[1])
+        sizes = {"q": (4, self.nodes), "u": u, "data": (self.sizes[3], 1), "load": (0, 1), "lam": (0, 1)}
         symbols = [ca.MX.sym(name, *size) for name, size in sizes.items()]
-        return symbols[:count], symbols[0], ca.reshape(symbols[2], self.width, self.nodes)
+        strains = symbols[1] if self.sizes[1] else ca.MX(0, self.nodes)
+        return symbols[:count], symbols[0], strains, ca.reshape(symbols[2], self.width, self.nodes)
 
     def _point(self, wanted: str) -> ca.Function:
         return self._element.point_energy(f"point_{name_of(self)}_{wanted}", self._at, self.width, wanted)
 
     @property
     def _element(self) -> Element:
-        return element_by_name(f"SFET{self.nodes}", self.space, self.gauss)
+        return element_by_name(f"SFET{self.nodes}", self.space, self.gauss, self.form.strains > 0)
 
 
 def law_of(scene: Scene, member: str) -> SectionLaw | None:
     """The law of a member's section; None for linear ones, and members that have none."""
     name = scene.members[member].section
     return None if name is None else scene.sections[name].law
+
+
+def form_of(scene: Scene, member: str) -> Form | None:
+    """The form of the law of a member's section; None as of :func:`law_of`."""
+    law = law_of(scene, member)
+    return None if law is None else law.form_in(scene.sections[str(scene.members[member].section)])
 
 
 def laws_in(parts: Parts) -> Iterator[One]:
@@ -219,45 +249,58 @@ def laws_in(parts: Parts) -> Iterator[One]:
         )
         x = cuts[name][:-1, None] + np.diff(cuts[name])[:, None] * element.points
         count, axis = len(cuts[name]) - 1, 0 if element.space else line.bending_axis
-        kind = AlongElement(element.space, element.order + 1, element.gauss, axis, law.form)
+        form = law.form_in(section)
+        kind = AlongElement(element.space, element.order + 1, element.gauss, axis, form)
         values = law.values(section, x.ravel())
-        if law.form.memory and name in (parts.mesh.memory or {}):
+        if form.memory and name in (parts.mesh.memory or {}):
             variables = (parts.mesh.memory or {})[name].variables.reshape(len(values), -1)
-            values = numbers(np.concatenate([values[:, : -law.form.memory], variables], axis=1))
+            values = numbers(np.concatenate([values[:, : -form.memory], variables], axis=1))
         weight = parts.beams.weight[first : first + count] * scales.length
         length = np.repeat(weight.sum(axis=1), x.shape[1])
         frames = quaternion.matrix(line.quaternions(x.ravel()))
         # Columns of the axes one after the other, as CasADi reads them.
         axes = frames.transpose(0, 2, 1).reshape(-1, 9) if element.space else frames[:, 2, axis - 1 : axis]
+        soft = section.compliance(x.ravel())[:, list(kind.strained)] * (scales.force * scales.length)
         data = np.concatenate(
             [
                 (weight.ravel() * values[:, 0] / scales.moment)[:, None],
                 axes / (length * values[:, 1])[:, None],
+                np.sqrt(soft / weight.ravel()[:, None]) / values[:, 1:2],
                 values[:, 2:],
             ],
             axis=1,
         ).reshape(count, -1)
-        for e in range(count):
-            turns = tuple(parts.rotations.turns[first + e].tolist())
-            yield One(kind, name, "", numbers(data[e]), turns, element=first + e)
+        for e in range(first, first + count):
+            turns = tuple(parts.rotations.turns[e].tolist())
+            places = tuple(parts.segments.strains[e].tolist()) if form.strains else ()
+            yield One(kind, name, "", numbers(data[e - first]), turns, places, element=e)
 
 
 # -- what a law says at given places ---------------------------------------------------------------------
 
 
 def _stiffness_and_form(scene: Scene, member: str, x: Array) -> tuple[Array, Array, ca.Function]:
-    """Matrices at rest (n, 3, 3), numbers (n, 2 + size), and the derivatives of the form."""
-    section = scene.sections[str(scene.members[member].section)]
+    """Matrices at rest (n, k, k) of curvatures and strains, numbers (n, 2 + size), and the derivatives of the form."""
+    section, form = scene.sections[str(scene.members[member].section)], form_of(scene, member)
     assert section.law is not None
-    return section.stiffness_matrix(x), section.law.values(section, x), derivatives_of(section.law.form)
+    assert form is not None
+    rest = section.stiffness_matrix(x)
+    if form.strains:
+        rest = np.pad(rest, ((0, 0), (0, form.strains), (0, form.strains)))
+        each = np.arange(3, form.arguments)
+        rest[:, each, each] = 1.0 / section.compliance(x)[:, : form.strains]
+    return rest, section.law.values(section, x), derivatives_of(form)
 
 
 def _moment_and_slope(change: Array, rest: Array, values: Array, derivatives: ca.Function) -> tuple[Array, Array]:
-    """Moments (n, 3), N m, and their derivatives (n, 3, 3), N m2, by changes of the curvatures (n, 3), 1/m."""
+    """Moments (n, 3), N m, and their derivatives (n, 3, 3), N m2, by changes of the curvatures (n, 3), 1/m.
+
+    With strains behind them also forces, N.
+    """
     unit, bent = values[:, 0], values[:, 1]
     _, gradient, hessian = derivatives.map(len(change))((change / bent[:, None]).T, values[:, 2:].T)
     moment = np.einsum("nij,nj->ni", rest, change) + gradient.full().T * (unit / bent)[:, None]
-    slope = rest + hessian.full().T.reshape(-1, 3, 3) * (unit / bent**2)[:, None, None]
+    slope = rest + hessian.full().T.reshape(rest.shape) * (unit / bent**2)[:, None, None]
     return moment, slope
 
 
@@ -265,7 +308,8 @@ def curvature_by_moment(scene: Scene, member: str, x: Array, moment: Array, near
     """Changes of the curvatures (n, 3), 1/m, at which a law gives moments (n, 3), N m, at fractions x (n,).
 
     Newton's method from the changes ``near`` (n, 3).  ``axes`` are the numbers, from 0, of those about which the scene
-    bends.  Where it does not lead to the moments, ``near`` itself is the answer.
+    bends.  Where it does not lead to the moments, ``near`` itself is the answer.  Of a law that depends on strains,
+    too, these follow the curvatures, and section forces, N, the moments.
     """
     return solved(*_stiffness_and_form(scene, member, x), moment, near, axes)
 
@@ -275,17 +319,21 @@ def solved(rest: Array, values: Array, derivatives: ca.Function, moment: Array, 
     of a form; also strains at which a law gives section forces.
     """
     change = near.copy()
-    size = np.abs(moment).max(initial=0.0) + np.abs(np.einsum("nij,nj->ni", rest, near)).max(initial=0.0)
+    # Forces count as moments that would store as much.
+    unit = np.sqrt(np.einsum("nii->ni", rest).max(axis=0, initial=0.0))
+    unit = np.concatenate([np.full(3, unit[:3].max()), unit[3:]]) / max(unit[:3].max(), TINY)
+    size = np.abs(moment / unit).max(initial=0.0)
+    size += np.abs(np.einsum("nij,nj->ni", rest, near) / unit).max(initial=0.0)
     for _ in range(NEWTON_STEPS):
         now, slope = _moment_and_slope(change, rest, values, derivatives)
         miss = (moment - now)[:, axes]
-        if not np.abs(miss).max(initial=0.0) > tolerances.DECIMAL * size:
+        if not np.abs(miss / unit[axes]).max(initial=0.0) > tolerances.DECIMAL * size:
             break
         # Where a law has no stiffness the step is long, and leads nowhere.
         firm = slope[:, axes][:, :, axes] + tolerances.WRITTEN * rest[:, axes][:, :, axes]
         change[:, axes] += np.linalg.solve(firm, miss[..., None])[..., 0]
     now = _moment_and_slope(change, rest, values, derivatives)[0]
-    met = np.abs((moment - now)[:, axes]).max(axis=1, initial=0.0) <= tolerances.WRITTEN * size
+    met = np.abs((moment - now)[:, axes] / unit[axes]).max(axis=1, initial=0.0) <= tolerances.WRITTEN * size
     return np.where(met[:, None], change, near)
 
 
@@ -334,7 +382,8 @@ def law_data(scene: Scene, member: str, x: Array) -> Array:
 def least_stiffness(scene: Scene, member: str, x: Array, change: Array, axes: list[int]) -> Array:
     """Smallest eigenvalue (n,) of the second derivatives of the potential over those at rest.
 
-    ``change`` (n, 3) are the changes of the curvatures, 1/m, at fractions x (n,).
+    ``change`` (n, 3) are the changes of the curvatures, 1/m, at fractions x (n,), with strains behind them where the
+    law depends on these.
     """
     rest, values, derivatives = _stiffness_and_form(scene, member, x)
     unit = np.sqrt(np.einsum("nii->ni", rest)[:, axes])

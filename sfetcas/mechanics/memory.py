@@ -68,15 +68,17 @@ class Remembering:
         for number, group, begin, end in zip(self.numbers, self._groups, self._bounds, self._bounds[1:], strict=False):
             yield number, group, slice(begin, end)
 
-    def after(self, q: Array, before: Array) -> Array:
-        """The vector after a step to rotations q, from that before it."""
-        variables, spent = [], []
+    def after(self, q: Array, y: Array, before: Array) -> Array:
+        """The vector after a step to rotations q and displacement unknowns y, from that before it."""
+        variables, spent, known = [], [], np.append(y, 0.0)
         for (_, group, part), function, shape in zip(self.parts(), self._functions, self._shapes, strict=True):
             n = shape[0]
             data = group.data.copy()
             data[:, group.kind.memory_columns] = before[part].reshape(shape)
             turned = q[group.turns].reshape(n * group.turns.shape[1], -1).T
-            found = function(turned, ca.DM(self.model.element.axes, 0), data.T, ca.DM(0, n), ca.DM(0, n))
+            # Places of strains are all unknown.
+            strains = known[self.model.positions.retained[group.places]].reshape(-1, self.model.element.axes).T
+            found = function(turned, strains, data.T, ca.DM(0, n), ca.DM(0, n))
             variables.append(np.array(found[0]).T.ravel())
             spent.append(np.array(found[1]).ravel())
         lost = before[self.size :] + np.concatenate([np.zeros(0), *spent])
@@ -104,14 +106,16 @@ class Remembering:
         return replace(self.model, mesh=self.mesh(vector), connections=tuple(connections))
 
 
-def dissipated_along(model: Model, q: Array) -> dict[str, float]:
-    """What each member with memory has dissipated since it was undeformed, J, after the step to rotations q."""
-    return {name: one.dissipated for name, one in (remembering(model, q).memory or {}).items()}
+def dissipated_along(model: Model, q: Array, y: Array) -> dict[str, float]:
+    """What each member with memory has dissipated since it was undeformed, J, after the step to rotations q and
+    displacement unknowns y.
+    """
+    return {name: one.dissipated for name, one in (remembering(model, q, y).memory or {}).items()}
 
 
-def remembering(model: Model, q: Array) -> Mesh:
-    """The mesh of a model with what its members remember after the step to rotations q."""
+def remembering(model: Model, q: Array, y: Array) -> Mesh:
+    """The mesh of a model with what its members remember after the step to rotations q and displacement unknowns y."""
     memory = Remembering(model)
     if not memory.size:
         return model.mesh
-    return memory.mesh(memory.after(q, memory.begun))
+    return memory.mesh(memory.after(q, y, memory.begun))

@@ -212,6 +212,10 @@ class Results:
             if self._motion and section.relaxation and kind.key in BY_FORCES[2:]:
                 message = f"found the {kind.key.replace('_', ' ')} along a member that relaxes, accepted: its force,"
                 raise SceneError(f"{message} moment, position and rotation")
+            law = section.law
+            if law is not None and law.form_in(section).strains and kind.key in BY_FORCES[2:]:
+                message = f"found the {kind.key} along a member whose law {law.type!r} depends on its strain, accepted:"
+                raise SceneError(f"{message} its force, moment, position and rotation, or answers of solve(scene)")
             if section.stretch_law is not None and kind.key == "strain":
                 message = "found the strain along a member with a law of stretch, accepted: its force, or answers of"
                 raise SceneError(f"{message} solve(scene)")

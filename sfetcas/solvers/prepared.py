@@ -49,6 +49,11 @@ ITERATIONS = 250
 BEYOND = 1e4
 """Ratio of multipliers to loads above which straight members would need an infinite force to hold the state."""
 
+FARTHEST = 1e12
+"""Displacements over the longest member, and scaled strains, beside which loads are rounding, so that what seems to be
+in balance there falls without end (1e20 was found); those of stiff members reach 1e7.
+"""
+
 PRESTRESSED = 1e-3
 """Largest rotation, rad, between an equilibrium and the same one without prestress of redundant members."""
 
@@ -233,6 +238,9 @@ class Prepared:
         if not np.all(np.isfinite(trial.q)):
             raise SolveError(Status.FAILED, result.message, state)
         polished = self.correct(trial, loading)
+        if np.abs(polished.state.y).max(initial=0.0) > FARTHEST:
+            detail = f"IPOPT: {result.message}, {counted(result.iterations, 'iteration')}"
+            raise SolveError(Status.UNBOUNDED, detail, trial)
         if not polished.residual <= tolerances.BALANCED and result.status not in (Status.INFEASIBLE, Status.UNBOUNDED):
             # Along a long flat valley steps in quaternions are short; increments of rotations allow long ones.
             polished = self.downhill(trial, loading) or polished
