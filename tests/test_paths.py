@@ -15,7 +15,7 @@ from sfetcas import Scene, SceneError, SolveError, Status, check, dump, load, so
 from sfetcas.cli import main
 from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.model import assemble
-from sfetcas.paths import paths
+from sfetcas.paths import paths, switching
 from sfetcas.pictures.charts import chart
 from sfetcas.solvers.arclength import Curve, Tangent
 from sfetcas.solvers.critical import Event, events_between, root
@@ -811,13 +811,13 @@ def test_no_point_of_a_path_is_outside_its_range(monkeypatch):
 
 def test_meshes_that_never_correspond_are_told(monkeypatch):
     """Each mesh is made to cross the factor asked for once more than the one before."""
-    levels, real = [], paths.at_factors
+    levels, real = [], switching.at_factors
 
     def more(curve, points, factors):
         levels.append(curve.model.mesh.elements)
         return len(levels) * real(curve, points, factors)
 
-    monkeypatch.setattr(paths, "at_factors", more)
+    monkeypatch.setattr(switching, "at_factors", more)
     monkeypatch.setattr(paths, "AFFORDED", 0)
     path = solve(made(column(range=[0, 2], steps=[1.0], accuracy=1e-6)))
     assert (path.status, path.error_estimate) == (Status.SHORT, None)

@@ -103,7 +103,10 @@ def test_wrong_stops_are_refused(spring, sentence):
 @pytest.mark.parametrize(
     ("analysis", "sentence"),
     [
-        ({"type": "path", "range": [0, 1]}, r"^springs\.k\.stop: found a stop on a path"),
+        (
+            {"type": "path", "range": [0, 1], "modes": 1},
+            r"^springs\.k\.stop: found a stop with analysis.modes on a path",
+        ),
         ({"equilibria": "all"}, r"^analysis\.equilibria: found 'all' with stops of springs"),
     ],
 )

@@ -10,22 +10,31 @@ would push the one that pushes most becomes slack, and a slack one that is longe
 
 from __future__ import annotations
 
-from typing import TypeVar
+from collections.abc import Callable
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from ..description.scene import Scene
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import first_of_largest
+from ..mechanics.fields import Fields
+from ..mechanics.unilateral import ROUNDING, Stops, margins, switched_over, unilaterals
 from .solution import Equilibrium, Solution, at_factor
 from .statics import Settings, solve
 
-__all__ = ["solve_stopped"]
+__all__ = ["next_stops", "settled", "solve_stopped"]
 
-Stops = tuple[tuple[str, str], ...]
-"""Springs at a stop: name, and low or high; tendons that are slack or let out: name, and slack or released."""
 
-T = TypeVar("T")
+class Answered(Protocol):
+    """An equilibrium of a model that knows its choice of stops and slack tendons."""
+
+    @property
+    def fields(self) -> Fields:
+        """Positions, forces and moments by name."""
+
+
+Found = TypeVar("Found", bound=Answered)
 
 
 def solve_stopped(scene: Scene, settings: Settings) -> Solution:
@@ -59,67 +68,64 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
 def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops, released: Stops) -> tuple[Solution, Stops]:
     """The answer of one factor with the tendons that are let out, from the stops that the factor before it reached."""
     alone = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"steps": (factor,)})})
-    tried: set[Stops] = set()
+    found: dict[Stops, Solution] = {}
+
+    def answer(stops: Stops) -> Equilibrium:
+        found[stops] = solve(alone, settings, stops=(*stops, *released))
+        return found[stops].last
+
+    _, stops = settled(scene, answer, stops)
+    return found[stops], stops
+
+
+def settled(scene: Scene, answer: Callable[[Stops], Found], stops: Stops) -> tuple[Found, Stops]:
+    """An equilibrium whose choice of stops and slack tendons holds, and that choice.
+
+    Parameters
+    ----------
+    scene : Scene
+    answer : callable
+        A choice -> the equilibrium in it, which has ``fields``.
+    stops : the choice to begin with
+
+    Raises
+    ------
+    SolveError
+        No choice holds; or the first error of the equilibria, where some choice has none.
+    """
+    tried, first = set[Stops](), None
     while stops not in tried:
         tried.add(stops)
-        found = solve(alone, settings, stops=(*stops, *released))
-        change = _next_stops(found.last, stops)
+        try:
+            found = answer(stops)
+        except SolveError as error:
+            # With more constraints than a structure can meet: none is active to begin with.
+            first, stops = first or error, switched_over((), [one for one in unilaterals(scene) if one.active(())])
+            continue
+        change = next_stops(found, stops)
         if change == stops:
             return found, stops
         stops = change
+    if first is not None:
+        raise first
     doubtful = sorted({stop for choice in tried for stop in choice})
     names = ", ".join(f"{'tendons' if side == 'slack' else 'springs'}.{name}" for name, side in doubtful)
     raise SolveError(Status.FAILED, f"no choice of stops and slack tendons holds: {names}")
 
 
-def _next_stops(answer: Equilibrium, stops: Stops) -> Stops:
-    """The stops without the one that pulls most or, where none does, with the one that is passed most.
+def next_stops(answer: Answered, stops: Stops) -> Stops:
+    """The choice to try after an equilibrium of another one; the same where that one holds.
 
-    Tendons come first: without the slack one that is longest beyond its free length, or with the one that pushes most.
+    The stops without the one that pulls most or, where none does, with the one that is passed most.
+
+    Tendons come first: with the one that pushes most, or without the slack one that is longest beyond its free length.
     """
-    scene, known = answer.model.scene, dict(stop for stop in stops if stop[1] != "slack")
-    changed = _next_slack(answer, stops)
-    if changed != stops:
-        return changed
-    pulls = {name: _pull(answer.spring(name).stop or 0.0, side) for name, side in stops if side != "slack"}
-    if pulls and max(pulls.values()) > 0.0:
-        worst = _first_of_most(pulls)
-        return tuple(stop for stop in stops if stop[0] != worst or stop[1] == "slack")
-    passed: dict[tuple[str, str], float] = {}
-    for name, spring in scene.springs.items():
-        if spring.stop is not None and name not in known:
-            travel, (low, high) = answer.spring(name).travel, spring.stop
-            passed[name, "low"], passed[name, "high"] = low - travel, travel - high
-    if passed and max(passed.values()) > 0.0:
-        return (*stops, _first_of_most(passed))
+    found = margins(answer.fields)
+    for table in ("tendons", "springs"):
+        for active in (True, False):
+            wrong = {one: -margin for one, margin in found.items() if (one.table, one.active(stops)) == (table, active)}
+            if wrong and max(wrong.values()) > ROUNDING:
+                # Of those that a symmetry makes the same the first in the scene.
+                worst = first_of_largest(np.maximum(list(wrong.values()), 0.0))
+                return switched_over(stops, [list(wrong)[worst]])
     return stops
-
-
-def _next_slack(answer: Equilibrium, stops: Stops) -> Stops:
-    """The stops with the tendon that pushes most, or without the slack one that is longest beyond its free length."""
-    tendons = {name: tendon for name, tendon in answer.model.scene.tendons.items() if tendon.may_be_slack}
-    if not tendons:
-        return stops
-    slack = {name for name, side in stops if side == "slack"}
-    pushing = {name: -answer.tendon(name)["tension"] for name in tendons if name not in slack}
-    if pushing and max(pushing.values()) > ROUNDING * answer.model.scales.force:
-        return (*stops, (_first_of_most(pushing), "slack"))
-    beyond = {name: answer.fields.beyond(name) for name in tendons if name in slack}
-    if beyond and max(beyond.values()) > ROUNDING * answer.model.scales.length:
-        worst = _first_of_most(beyond)
-        return tuple(stop for stop in stops if stop != (worst, "slack"))
-    return stops
-
-
-ROUNDING = 1e-12
-"""Of tensions and lengths over the units of the model: a tendon that has next to nothing to do stays as it is."""
-
-
-def _first_of_most(found: dict[T, float]) -> T:
-    """The name of the largest number above zero; of those that a symmetry makes the same the first in the scene."""
-    return list(found)[first_of_largest(np.maximum(list(found.values()), 0.0))]
-
-
-def _pull(effort: float, side: str) -> float:
-    """How much a stop holds back instead of pushing back: a high one pushes down, a low one up."""
-    return effort if side == "high" else -effort
