@@ -216,6 +216,7 @@ ORDER = [
     "parametric.changing",
     "parametric.equilibrium",
     "parametric.implicit",
+    "parametric.choosing",
     "parametric.solving",
     "parametric.fitting",
     "parametric.moving",

@@ -630,11 +630,11 @@ def test_bad_analyses_are_refused_with_one_sentence(analysis, sentence):
         ({"limit_point": 0}, "expect.0.limit_point: found 0, accepted: a whole number from 1"),
         (
             {"limit_point": 1, "bifurcation": 1},
-            "expect.0: accepted: one of the keys step, time, limit_point, bifurcation, flutter_point",
+            "expect.0: accepted: one of the keys step, time, limit_point, bifurcation, flutter_point, transition",
         ),
         (
             {"step": 1.0, "limit_point": 1},
-            "expect.0: accepted: one of the keys step, time, limit_point, bifurcation, flutter_point",
+            "expect.0: accepted: one of the keys step, time, limit_point, bifurcation, flutter_point, transition",
         ),
     ],
 )

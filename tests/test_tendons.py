@@ -786,8 +786,11 @@ def test_slackness_is_not_searched_in_motions(kind):
     analysis = {"type": kind, **({"end": 1.0} if kind == "dynamic" else {})}
     with pytest.raises(SceneError, match=f"tendons.t: found a length that is given with the analysis '{kind}'"):
         rod(pull=0.01, analysis=analysis)
-    with pytest.raises(SceneError, match=r"tendons\.t: whether a tendon is slack is found by a search"):
-        sfetcas.parametric(rod(pull=0.01), ["tendons.t.pull"], ["nodes.B.position"])
+
+
+def test_slackness_is_not_searched_in_generated_code(tmp_path):
+    with pytest.raises(SceneError, match=r"tendons\.t: whether a tendon is slack is found by a search that is not"):
+        sfetcas.export(rod(pull=0.01), tmp_path)
 
 
 def test_a_pull_does_not_jump():

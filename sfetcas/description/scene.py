@@ -952,6 +952,7 @@ _ANSWERS = {
     "limit_point": ("path",),
     "bifurcation": ("path",),
     "flutter_point": ("path",),
+    "transition": ("path",),
 }
 """Types of the analysis that have an answer of this kind."""
 

@@ -10,31 +10,21 @@ would push the one that pushes most becomes slack, and a slack one that is longe
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol, TypeVar
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from ..description.scene import Scene
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import first_of_largest
-from ..mechanics.fields import Fields
-from ..mechanics.unilateral import ROUNDING, Stops, margins, switched_over, unilaterals
+from ..mechanics.unilateral import ROUNDING, Stops, Unilateral, margins, switched_over, unilaterals
 from .solution import Equilibrium, Solution, at_factor
 from .statics import Settings, solve
 
 __all__ = ["next_stops", "settled", "solve_stopped"]
 
 
-class Answered(Protocol):
-    """An equilibrium of a model that knows its choice of stops and slack tendons."""
-
-    @property
-    def fields(self) -> Fields:
-        """Positions, forces and moments by name."""
-
-
-Found = TypeVar("Found", bound=Answered)
+Margins = Mapping[Unilateral, float]
 
 
 def solve_stopped(scene: Scene, settings: Settings) -> Solution:
@@ -70,23 +60,24 @@ def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops, rel
     alone = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"steps": (factor,)})})
     found: dict[Stops, Solution] = {}
 
-    def answer(stops: Stops) -> Equilibrium:
+    def answer(stops: Stops) -> Margins:
         found[stops] = solve(alone, settings, stops=(*stops, *released))
-        return found[stops].last
+        return margins(found[stops].last.fields)
 
-    _, stops = settled(scene, answer, stops)
+    stops = settled(scene, answer, stops)
     return found[stops], stops
 
 
-def settled(scene: Scene, answer: Callable[[Stops], Found], stops: Stops) -> tuple[Found, Stops]:
-    """An equilibrium whose choice of stops and slack tendons holds, and that choice.
+def settled(scene: Scene, answer: Callable[[Stops], Margins], stops: Stops) -> Stops:
+    """A choice of stops and slack tendons that holds.
 
     Parameters
     ----------
     scene : Scene
     answer : callable
-        A choice -> the equilibrium in it, which has ``fields``.
-    stops : the choice to begin with
+        A choice -> the margins of the equilibrium in it.
+    stops : tuple of (str, str)
+        The choice to begin with.
 
     Raises
     ------
@@ -104,7 +95,7 @@ def settled(scene: Scene, answer: Callable[[Stops], Found], stops: Stops) -> tup
             continue
         change = next_stops(found, stops)
         if change == stops:
-            return found, stops
+            return stops
         stops = change
     if first is not None:
         raise first
@@ -113,14 +104,13 @@ def settled(scene: Scene, answer: Callable[[Stops], Found], stops: Stops) -> tup
     raise SolveError(Status.FAILED, f"no choice of stops and slack tendons holds: {names}")
 
 
-def next_stops(answer: Answered, stops: Stops) -> Stops:
-    """The choice to try after an equilibrium of another one; the same where that one holds.
+def next_stops(found: Margins, stops: Stops) -> Stops:
+    """The choice to try after one with these margins; the same where that one holds.
 
     The stops without the one that pulls most or, where none does, with the one that is passed most.
 
     Tendons come first: with the one that pushes most, or without the slack one that is longest beyond its free length.
     """
-    found = margins(answer.fields)
     for table in ("tendons", "springs"):
         for active in (True, False):
             wrong = {one: -margin for one, margin in found.items() if (one.table, one.active(stops)) == (table, active)}

@@ -13,7 +13,7 @@ Source: Cottle, Pang and Stone 2009, The Linear Complementarity Problem, theorem
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -41,6 +41,9 @@ STEP = 1e-5
 
 FLAT = 1e-7
 """Rates of margins by the arc length that are as small say nothing."""
+
+LOCKED = 1e-3
+"""Rates of gaps by the arc length where active constraints lock what is to move; elsewhere they are next to none."""
 
 ALIKE = 1e-6
 """Two ways on whose directions differ by less are one: a constraint that does nothing makes no other."""
@@ -186,11 +189,11 @@ class Choices:
         """
         found: dict[Stops, tuple[Curve, Standing, tuple[str, ...]]] = {}
 
-        def answer(stops: Stops) -> Standing:
+        def answer(stops: Stops) -> Mapping[Unilateral, float]:
             found[stops] = begin_path(self.prepared(stops), self.span)
-            return found[stops][1]
+            return margins(found[stops][1].fields)
 
-        _, stops = settled(self.prepared(()).model.scene, answer, stops)
+        stops = settled(self.prepared(()).model.scene, answer, stops)
         curve, start, notes = found[stops]
         self.unit = curve.unit
         near = self._without_margin(start)
@@ -226,7 +229,7 @@ class Choices:
                 found.ending = _several(ways, near, self.constraints)
                 return found
             way, way_on = ways[0], ways[0].standing
-            turns = at.tangent.factor * way_on.tangent.factor < 0.0
+            turns = bool(at.tangent.factor * way_on.tangent.factor < 0.0)
             changes = tuple(one.becomes(stops) for one in way.which)
             found.transitions.append(Transition(at, changes, turns, _said(at, way_on, turns)))
             curve, start = way.curve, way_on
@@ -284,7 +287,7 @@ class Choices:
     def _way(
         self, at: Standing, stops: Stops, which: tuple[Unilateral, ...], sign: float, *, regular: bool = True
     ) -> _Way | None:
-        """The way on in a choice with a rising or falling factor; None where the equilibrium is singular in it.
+        """The way on in a choice with a rising or falling factor; None where what is left is singular in it, or locked.
 
         Motions that are neutral in the choice before are so in any that has fewer active constraints.
         """
@@ -297,6 +300,10 @@ class Choices:
         if here.residual > PASSING:
             # A margin that was next to nothing is none now.
             here = curve.at_factor(here, at.factor) or curve.corrected(here.state, here.factor, here.tangent) or here
+        state, factor = curve.predicted(here, STEP)
+        gaps = curve.equations.at(state, curve.loading(factor)).residual[curve.equations.unknowns :]
+        if regular and np.abs(gaps).max(initial=0.0) > LOCKED * STEP:
+            return None
         # Curves are kept without a piece: they are followed over all of them.
         return _Way(which, stops, self.curve(stops), replace(here, arc=at.arc))
 
