@@ -241,6 +241,23 @@ def test_strings_that_cannot_be_taut_at_once_begin_slack():
     assert step.spring("k").travel == pytest.approx(angle, abs=1e-12)
 
 
+def test_all_equilibria_where_a_string_holds_one_of_them():
+    """A bar that stands under a load leans to either side, to one only until its string is taut."""
+    table = bar(springs={"k": {"node": "A", "stiffness": 1.0}}, tendons={"t": string("B", [1, 1], length=1.4)})
+    table["nodes"]["B"]["position"] = [0, 1]
+    table["loads"]["f"]["value"] = [0, -2.0]
+    steps = solve(Scene.from_dict({**table, "analysis": {"equilibria": "all"}})).steps
+    free = brentq(lambda a: a - 2.0 * np.sin(a), 1.0, 3.0, xtol=1e-14)
+    held = brentq(lambda a: np.hypot(1.0 + np.sin(a), 1.0 - np.cos(a)) - 1.4, 0.0, 1.0, xtol=1e-14)
+    angles = sorted(step.spring("k").travel for step in steps)
+    np.testing.assert_allclose(angles, [-free, 0.0, held], atol=1e-8)
+    for step in steps:
+        angle, taut = step.spring("k").travel, not step.tendon("t")["slack"]
+        assert step.certificate.stable is bool(abs(angle) > 0.1)
+        assert taut == (angle > 0.1)
+    assert "each of 2 choices of slack tendons and stops, of which 2 have any" in steps[0].notes[-1]
+
+
 # -- at random ------------------------------------------------------------------------------------------
 
 

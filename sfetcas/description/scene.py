@@ -509,9 +509,8 @@ def _check_tendons(scene: Scene) -> None:
             if way.member is not None and not way.holes and scene.members[way.member].branches(scene.sections):
                 found = f"found the member {way.member!r}, whose section relaxes"
                 raise SceneError(f"{found}, accepted: discs, or a member that does not", ("tendons", name))
-        if tendon.may_be_slack and (scene.analysis.moves or scene.analysis.equilibria == "all"):
+        if tendon.may_be_slack and scene.analysis.moves:
             what = "modes on a path" if scene.analysis.type == "path" else f"the analysis {scene.analysis.type!r}"
-            what = what if scene.analysis.moves else "'all' equilibria"
             message = f"found a length that is given with {what}, in which no tendon becomes slack, accepted: pushes ="
             raise SceneError(f"{message} true, with which it is kept as long, or a stiffness", ("tendons", name))
 

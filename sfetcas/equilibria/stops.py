@@ -11,6 +11,9 @@ would push the one that pushes most becomes slack, and a slack one that is longe
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from itertools import product
+from math import prod
 
 import numpy as np
 
@@ -18,6 +21,7 @@ from ..description.scene import Scene
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import first_of_largest
 from ..mechanics.unilateral import ROUNDING, Stops, Unilateral, margins, switched_over, unilaterals
+from .several import alike
 from .solution import Equilibrium, Solution, at_factor
 from .statics import Settings, solve
 
@@ -33,20 +37,18 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
     Raises
     ------
     SceneError
-        All equilibria are asked for.
+        All equilibria are asked for, of too many choices of what is slack and at a stop.
     SolveError
         The active-set iteration repeats itself, or a load factor has no equilibrium that could be found.
     """
-    if scene.analysis.equilibria == "all":
-        message = "found 'all' with stops of springs, accepted: 'one'"
-        raise SceneError(message, ("analysis", "equilibria"))
+    choices = _choices(scene) if scene.analysis.equilibria == "all" and scene.stopped else ()
     steps: list[Equilibrium] = []
     status, seconds = Status.SOLVED, {"model": 0.0, "solve": 0.0}
     stops: Stops = ()
     for factor, released in zip(scene.analysis.steps, scene.released_at_steps(), strict=True):
         try:
             out = tuple((name, "released") for name in scene.tendons if name in released)
-            found, stops = _at_stops(scene, settings, factor, stops, out)
+            found, stops = _at_stops(scene, settings, factor, stops, out, choices)
         except SolveError as error:
             raise at_factor(error, scene, factor, steps, seconds) from None
         steps += found.steps
@@ -55,9 +57,38 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
     return Solution(scene, status, tuple(steps), seconds)
 
 
-def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops, released: Stops) -> tuple[Solution, Stops]:
-    """The answer of one factor with the tendons that are let out, from the stops that the factor before it reached."""
+def _choices(scene: Scene) -> tuple[Stops, ...]:
+    """All choices of what is slack and at a stop.
+
+    Raises
+    ------
+    SceneError
+        There are too many to look for the equilibria of each.
+    """
+    parties: dict[str, list[tuple[tuple[str, str], ...]]] = {}
+    for one in unilaterals(scene):
+        parties.setdefault(f"{one.table}.{one.name}", [()]).append((one.entry,))
+    count = prod(map(len, parties.values()))
+    if count > MOST_CHOICES:
+        found = f"found 'all' with {count} choices of slack tendons and stops of springs"
+        raise SceneError(f"{found}, accepted: at most {MOST_CHOICES}, or 'one'", ("analysis", "equilibria"))
+    return tuple(switched_over(sum(parts, ()), ()) for parts in product(*parties.values()))
+
+
+MOST_CHOICES = 16
+"""Choices of what is slack and at a stop of which all equilibria are looked for."""
+
+
+def _at_stops(
+    scene: Scene, settings: Settings, factor: float, stops: Stops, released: Stops, choices: tuple[Stops, ...] = ()
+) -> tuple[Solution, Stops]:
+    """The answer of one factor with the tendons that are let out, from the stops that the factor before it reached.
+
+    With ``choices`` all equilibria of these, see :func:`_all_of`.
+    """
     alone = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"steps": (factor,)})})
+    if choices:
+        return _all_of(alone, settings, choices), ()
     found: dict[Stops, Solution] = {}
 
     def answer(stops: Stops) -> Margins:
@@ -66,6 +97,46 @@ def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops, rel
 
     stops = settled(scene, answer, stops)
     return found[stops], stops
+
+
+def _all_of(alone: Scene, settings: Settings, choices: tuple[Stops, ...]) -> Solution:
+    """The equilibria of one factor in each choice whose margins say that it holds, by rising energy.
+
+    Raises
+    ------
+    SolveError
+        No equilibrium of any choice holds; or the first error, where a choice has none.
+    """
+    steps: list[Equilibrium] = []
+    searched, first, seconds, status = 0, None, {"model": 0.0, "solve": 0.0}, Status.SOLVED
+    for choice in choices:
+        try:
+            found = solve(alone, settings, stops=choice)
+        except SolveError as error:
+            # As where not all strings can be taut.
+            first = first or error
+            continue
+        seconds = {key: seconds[key] + found.seconds[key] for key in seconds}
+        status = found.status if status is Status.SOLVED else status
+        searched += 1
+        # What is said of the search of one choice is not true of all.
+        entries = (replace(found.steps[0], notes=found.steps[0].notes[:-1]), *found.steps[1:])
+        held = [entry for entry in entries if min(margins(entry.fields).values()) >= -NEAR]
+        # What just touches is an equilibrium with and without it.
+        steps += [entry for entry in held if not any(alike(entry, other) for other in steps)]
+    if not steps:
+        raise first or SolveError(Status.FAILED, "no choice of stops and slack tendons holds")
+    steps.sort(key=lambda entry: entry.potential)
+    note = (
+        f"looked for in each of {len(choices)} choices of slack tendons and stops, of which {searched} have any; "
+        "there may be more equilibria"
+    )
+    steps[0] = replace(steps[0], notes=(*steps[0].notes, note))
+    return Solution(alone, status, tuple(steps), seconds)
+
+
+NEAR = 1e-9
+"""Margins of all equilibria may be below zero by as much: rounding leaves less of what is zero."""
 
 
 def settled(scene: Scene, answer: Callable[[Stops], Margins], stops: Stops) -> Stops:

@@ -188,6 +188,10 @@ class Choices:
             There is no equilibrium to start from, or none that tells in which choice the path goes on.
         """
         found: dict[Stops, tuple[Curve, Standing, tuple[str, ...]]] = {}
+        if not self.constraints:
+            found[stops] = begin_path(self.prepared(stops), self.span)
+            self.unit = found[stops][0].unit
+            return found[stops]
 
         def answer(stops: Stops) -> Mapping[Unilateral, float]:
             found[stops] = begin_path(self.prepared(stops), self.span)
