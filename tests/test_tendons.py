@@ -788,6 +788,11 @@ def test_slackness_is_not_searched_in_motions(kind):
         rod(pull=0.01, analysis=analysis)
 
 
+def test_slackness_is_not_searched_with_modes_on_a_path():
+    with pytest.raises(SceneError, match=r"tendons\.t: found a length that is given with modes on a path, in which no"):
+        rod(pull=0.01, analysis={"type": "path", "range": [0, 1], "modes": 2})
+
+
 def test_slackness_is_not_searched_in_generated_code(tmp_path):
     with pytest.raises(SceneError, match=r"tendons\.t: whether a tendon is slack is found by a search that is not"):
         sfetcas.export(rod(pull=0.01), tmp_path)
