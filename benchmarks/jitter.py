@@ -139,7 +139,7 @@ def _outputs(answer: Answer, how: Jittered) -> _Outputs:
     elif isinstance(answer, Path):
         outputs.words["notes"] = said(answer.notes)
         estimate = max(answer.error_estimate or 0.0, 1e-7)
-        for kind in ("limit_points", "bifurcations", "flutter_points"):
+        for kind in ("limit_points", "bifurcations", "flutter_points", "transitions"):
             found = getattr(answer, kind)
             outputs.words[kind] = len(found)
             # The path has a unit of the factors; each is right to the error relative to the largest.

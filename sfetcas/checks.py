@@ -117,7 +117,7 @@ def _entry_of(solution: Answer, expect: Expect) -> Equilibrium | MotionState:
 
 
 def _entry_on_path(path: Path, expect: Expect) -> Equilibrium:
-    for key in ("limit_point", "bifurcation", "flutter_point"):
+    for key in ("limit_point", "bifurcation", "flutter_point", "transition"):
         number = getattr(expect, key)
         if number is not None:
             return _numbered(getattr(path, f"{key}s"), number, key)

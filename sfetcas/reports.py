@@ -9,13 +9,13 @@ import numpy as np
 
 from .checks import Answer, Check
 from .description.answers import answer_name
-from .description.records import counted
+from .description.records import counted, enumerated
 from .description.showing import WAYS, error_in_words, stability_in_words
 from .dynamics.motion import MotionState, Trajectory
 from .equilibria.solution import Equilibrium
 from .mathematics.arrays import Array, first_of_largest
 from .mechanics.model import Model
-from .paths.path import Branch, FlutterPoint
+from .paths.path import Branch, FlutterPoint, TransitionPoint
 from .paths.path import Path as Course
 from .quoting import printable
 
@@ -53,7 +53,7 @@ def report(solution: Answer, seconds: float) -> None:
 
 
 def _report_path(path: Course) -> None:
-    counts = {"limit point": 0, "bifurcation": 0, "flutter point": 0}
+    counts = {"limit point": 0, "bifurcation": 0, "flutter point": 0, "transition": 0}
     for number, branch in enumerate(path.branches):
         name = f"branch {number} at bifurcation {branch.bifurcation}, side {branch.side:+d}" if number else "path"
         low, high = branch.factors.min(), branch.factors.max()
@@ -201,6 +201,7 @@ def _report_events(branch: Branch, counts: dict[str, int]) -> None:
         ("limit point", branch.limit_points),
         ("bifurcation", branch.bifurcations),
         ("flutter point", branch.flutter_points),
+        ("transition", branch.transitions),
     )
     for kind, entries in kinds:
         for entry in entries:
@@ -209,7 +210,8 @@ def _report_events(branch: Branch, counts: dict[str, int]) -> None:
             said = "" if error is None else f", estimated error {error:.1e}"
             ways = f", {counted(entry.certificate.negative, *WAYS)}" if entry.certificate.negative else ""
             wave = f", {entry.omega:.9g} rad/s" if isinstance(entry, FlutterPoint) else ""
-            print(f"  {kind} {counts[kind]}: factor {entry.factor:.12g}{wave}{ways}{said}")
+            what = f", {enumerated(entry.changes)}" if isinstance(entry, TransitionPoint) else ""
+            print(f"  {kind} {counts[kind]}: factor {entry.factor:.12g}{what}{wave}{ways}{said}")
             for note in entry.notes:
                 print(f"    note: {note}")
 
@@ -388,7 +390,7 @@ def _row(c: Check) -> tuple[str, ...]:
     step = "" if expect.step is None else f" step {expect.step:g}"
     step += "" if expect.time is None else f" time {expect.time:g}"
     step += "" if expect.equilibrium is None else f" equilibrium {expect.equilibrium}"
-    for key in ("crossing", "limit_point", "bifurcation", "flutter_point"):
+    for key in ("crossing", "limit_point", "bifurcation", "flutter_point", "transition"):
         number = getattr(expect, key)
         step += "" if number is None else f" {key.replace('_', ' ')} {number}"
     tolerance = "exact" if expect.tolerance is None else f"{expect.tolerance:.1e}"

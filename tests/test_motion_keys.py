@@ -186,7 +186,7 @@ def test_answers_at_times_and_flutter_points():
     assert made({**of_type("modes"), "expect": [{**EXPECTED, "step": 1}]}).expect[0].step == 1.0
     refused(
         {"expect": [{**EXPECTED, "time": 1, "flutter_point": 1}]},
-        "expect.0: accepted: one of the keys step, time, limit_point, bifurcation, flutter_point",
+        "expect.0: accepted: one of the keys step, time, limit_point, bifurcation, flutter_point, transition",
     )
 
 

@@ -282,13 +282,6 @@ def test_what_turns_freely_about_itself_has_derivatives():
     assert answer.jacobian["nodes.B.position"]["loads.w.value"] == pytest.approx(wanted, abs=1e-8)
 
 
-def stopped():
-    table = cantilever()
-    table["springs"] = {"k": {"node": "A", "stiffness": 2.0, "stop": [-0.1, 0.1]}}
-    table["nodes"]["A"]["support"] = "hinge"
-    return table
-
-
 REFUSED = [
     (cantilever, [3], "parameters: found 3, accepted: names of numbers of the scene"),
     (cantilever, {"loads.tip.value": (0.0,)}, r"loads.tip.value: found \(0.0,\), accepted: a range from low to high"),
@@ -309,7 +302,6 @@ REFUSED = [
         {"L": Parameter(1.0, lambda x: {"nodes.B.position.0": math.exp(x - 1.0)})},
         "parameters.L: found a function that takes plain numbers only .*, accepted: NumPy's functions, as np.sin",
     ),
-    (stopped, ["loads.tip.value"], "springs.k.stop: which stops act is found by a search that is without derivatives"),
     (
         cantilever,
         {"length": Parameter(1.1, lambda x: {"nodes.B.position.0": x})},

@@ -15,7 +15,7 @@ from sfetcas import Scene, SceneError, SolveError, Status, check, dump, load, so
 from sfetcas.cli import main
 from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.model import assemble
-from sfetcas.paths import paths
+from sfetcas.paths import paths, switching
 from sfetcas.pictures.charts import chart
 from sfetcas.solvers.arclength import Curve, Tangent
 from sfetcas.solvers.critical import Event, events_between, root
@@ -630,11 +630,11 @@ def test_bad_analyses_are_refused_with_one_sentence(analysis, sentence):
         ({"limit_point": 0}, "expect.0.limit_point: found 0, accepted: a whole number from 1"),
         (
             {"limit_point": 1, "bifurcation": 1},
-            "expect.0: accepted: one of the keys step, time, limit_point, bifurcation, flutter_point",
+            "expect.0: accepted: one of the keys step, time, limit_point, bifurcation, flutter_point, transition",
         ),
         (
             {"step": 1.0, "limit_point": 1},
-            "expect.0: accepted: one of the keys step, time, limit_point, bifurcation, flutter_point",
+            "expect.0: accepted: one of the keys step, time, limit_point, bifurcation, flutter_point, transition",
         ),
     ],
 )
@@ -811,13 +811,13 @@ def test_no_point_of_a_path_is_outside_its_range(monkeypatch):
 
 def test_meshes_that_never_correspond_are_told(monkeypatch):
     """Each mesh is made to cross the factor asked for once more than the one before."""
-    levels, real = [], paths.at_factors
+    levels, real = [], switching.at_factors
 
     def more(curve, points, factors):
         levels.append(curve.model.mesh.elements)
         return len(levels) * real(curve, points, factors)
 
-    monkeypatch.setattr(paths, "at_factors", more)
+    monkeypatch.setattr(switching, "at_factors", more)
     monkeypatch.setattr(paths, "AFFORDED", 0)
     path = solve(made(column(range=[0, 2], steps=[1.0], accuracy=1e-6)))
     assert (path.status, path.error_estimate) == (Status.SHORT, None)

@@ -100,16 +100,19 @@ def test_wrong_stops_are_refused(spring, sentence):
         made(table)
 
 
-@pytest.mark.parametrize(
-    ("analysis", "sentence"),
-    [
-        ({"type": "path", "range": [0, 1]}, r"^springs\.k\.stop: found a stop on a path"),
-        ({"equilibria": "all"}, r"^analysis\.equilibria: found 'all' with stops of springs"),
-    ],
-)
-def test_searches_that_know_no_stops_are_refused(analysis, sentence):
-    with pytest.raises(SceneError, match=sentence):
-        solve(made(lever([1.0]) | {"analysis": analysis}))
+def test_modes_on_a_path_know_no_stops():
+    analysis = {"type": "path", "range": [0, 1], "modes": 1}
+    with pytest.raises(SceneError, match=r"^springs\.k\.stop: found a stop with analysis.modes on a path"):
+        made(lever([1.0]) | {"analysis": analysis})
+
+
+def test_all_equilibria_of_too_many_stops_are_refused():
+    table = lever([1.0], analysis={"equilibria": "all"})
+    table["springs"] |= {name: {**table["springs"]["k"], "stiffness": 0.0} for name in ("l", "m")}
+    with pytest.raises(
+        SceneError, match=r"^analysis\.equilibria: found 'all' with 27 choices of slack tendons and stops"
+    ):
+        solve(made(table))
 
 
 def test_report_tells_what_the_stop_does(tmp_path, capsys):

@@ -116,7 +116,8 @@ def _save(figure: Figure, file: Path) -> None:
 
 
 def _choice(expect: Any) -> Iterator[str]:
-    for key in ("at", "step", "time", "equilibrium", "crossing", "limit_point", "bifurcation", "flutter_point"):
+    places = ("at", "step", "time", "equilibrium", "crossing")
+    for key in (*places, "limit_point", "bifurcation", "flutter_point", "transition"):
         if getattr(expect, key) is not None:
             yield f"{key} {getattr(expect, key):g}"
 

@@ -243,7 +243,7 @@ ANSWERS = tuple(_kind(row) for row in TABLE.strip().splitlines())
 RECORDS = {"reactions": "nodes", "stiffness": "nodes", "compliance": "nodes"}
 """Tables of the scene whose names stand in a table of the answer, where it has another name."""
 
-SELECTORS = ("at", "step", "time", "crossing", "limit_point", "bifurcation", "flutter_point")
+SELECTORS = ("at", "step", "time", "crossing", "limit_point", "bifurcation", "flutter_point", "transition")
 """Words that say where and of which answer."""
 
 COUNTED = SELECTORS[3:]

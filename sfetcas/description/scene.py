@@ -527,9 +527,8 @@ def _check_tendons(scene: Scene) -> None:
             if way.member is not None and not way.holes and scene.members[way.member].branches(scene.sections):
                 found = f"found the member {way.member!r}, whose section relaxes"
                 raise SceneError(f"{found}, accepted: discs, or a member that does not", ("tendons", name))
-        searched = scene.analysis.type in ("static", "dynamic")
-        if tendon.may_be_slack and (not searched or scene.analysis.equilibria == "all"):
-            what = "'all' equilibria" if scene.analysis.type == "static" else f"the analysis {scene.analysis.type!r}"
+        if tendon.may_be_slack and scene.analysis.count_of_modes:
+            what = "modes on a path" if scene.analysis.type == "path" else f"the analysis {scene.analysis.type!r}"
             message = f"found a length that is given with {what}, in which no tendon becomes slack, accepted: pushes ="
             raise SceneError(f"{message} true, with which it is kept as long, or a stiffness", ("tendons", name))
 
@@ -886,8 +885,8 @@ def _check_moving(scene: Scene) -> None:
 def _check_contacts(scene: Scene) -> None:
     space = scene.resolved_dimension == "space"
     for name, spring in scene.springs.items():
-        if spring.stop is not None and scene.analysis.type == "path":
-            message = "found a stop on a path, accepted: with analysis.type = 'static' and steps"
+        if spring.stop is not None and scene.contacts and scene.analysis.type == "path":
+            message = "found a stop with contacts on a path, accepted: with analysis.type = 'static' and steps"
             raise SceneError(message, ("springs", name, "stop"))
     if scene.contacts and scene.analysis.branches:
         message = (
@@ -971,6 +970,7 @@ _ANSWERS = {
     "limit_point": ("path",),
     "bifurcation": ("path",),
     "flutter_point": ("path",),
+    "transition": ("path",),
 }
 """Types of the analysis that have an answer of this kind."""
 

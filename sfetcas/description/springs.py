@@ -63,8 +63,8 @@ class Spring(Record):
     damping : N m s/rad, or N s/m of a translational spring
         Moment or force against the rate of the angle, travel or length, per unit of that rate.
     stop : (2,), rad, or m with a ``direction``
-        ``[low, high]`` about 0: the angle, or the travel along a ``direction``, goes no further.  In statics
-        and motions; what moves does not rebound from it.
+        ``[low, high]`` about 0: the angle, or the travel along a ``direction``, goes no further.  In statics,
+        on paths, in motions and in parametric solvers; what moves does not rebound from it.
     """
 
     type: Literal["rotational", "translational"] = "rotational"

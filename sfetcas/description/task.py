@@ -286,6 +286,8 @@ class Expect(Record):
         Of a path: which bifurcation, from 1.
     flutter_point : whole number
         Of a path: which flutter point, from 1.
+    transition : whole number
+        Of a path: which transition, where tendons go slack or become taut and stops are reached or left, from 1.
     """
 
     quantity: str
@@ -301,6 +303,7 @@ class Expect(Record):
     limit_point: Count | None = None
     bifurcation: Count | None = None
     flutter_point: Count | None = None
+    transition: Count | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -318,7 +321,7 @@ class Expect(Record):
     def _check(self) -> Expect:
         if self.crossing is not None and self.step is None:
             raise SceneError("the key 'step' is missing: a crossing is one of a factor", ("crossing",))
-        places = ("step", "time", "limit_point", "bifurcation", "flutter_point")
+        places = ("step", "time", "limit_point", "bifurcation", "flutter_point", "transition")
         if sum(getattr(self, key) is not None for key in places) > 1:
             raise SceneError(f"accepted: one of the keys {', '.join(places)}")
         if self.tolerance is None and isinstance(self.value, (float, tuple)):

@@ -32,7 +32,7 @@ from ..solvers.prepared import Prepared, Solved
 from .mirrors import Mirror, mirrored, mirrors
 from .solution import Equilibrium
 
-__all__ = ["Search", "long_elements", "missing", "same", "search"]
+__all__ = ["Search", "alike", "long_elements", "missing", "same", "search"]
 
 RUNS, FEWEST_RUNS, EFFORT = 300, 60, 40_000
 """Newton runs at most by default, fewer (but some) where runs times unknowns, twice in space, are more."""
@@ -374,8 +374,11 @@ def long_elements(found: Solved) -> dict[str, Array]:
 
 def same(one: Equilibrium, other: Equilibrium) -> bool:
     """Whether two answers, on any meshes, agree within their estimated errors and have as many negative eigenvalues."""
-    if one.certificate.negative != other.certificate.negative:
-        return False
+    return one.certificate.negative == other.certificate.negative and alike(one, other)
+
+
+def alike(one: Equilibrium, other: Equilibrium) -> bool:
+    """Whether two answers, on any meshes, agree within their estimated errors."""
     errors = (one.certificate.error_estimate or 0.0) + (other.certificate.error_estimate or 0.0)
     return largest_difference(one.fields, other.fields) <= 2.0 * errors + 1e-9
 

@@ -10,22 +10,25 @@ would push the one that pushes most becomes slack, and a slack one that is longe
 
 from __future__ import annotations
 
-from typing import TypeVar
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from itertools import product
+from math import prod
 
 import numpy as np
 
 from ..description.scene import Scene
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import first_of_largest
+from ..mechanics.unilateral import ROUNDING, Stops, Unilateral, margins, switched_over, unilaterals
+from .several import alike
 from .solution import Equilibrium, Solution, at_factor
 from .statics import Settings, solve
 
-__all__ = ["solve_stopped"]
+__all__ = ["next_stops", "settled", "solve_stopped"]
 
-Stops = tuple[tuple[str, str], ...]
-"""Springs at a stop: name, and low or high; tendons: name, and slack, or released or pulled."""
 
-T = TypeVar("T")
+Margins = Mapping[Unilateral, float]
 
 
 def solve_stopped(scene: Scene, settings: Settings) -> Solution:
@@ -34,20 +37,18 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
     Raises
     ------
     SceneError
-        All equilibria are asked for.
+        All equilibria are asked for, of too many choices of what is slack and at a stop.
     SolveError
         The active-set iteration repeats itself, or a load factor has no equilibrium that could be found.
     """
-    if scene.analysis.equilibria == "all":
-        message = "found 'all' with stops of springs, accepted: 'one'"
-        raise SceneError(message, ("analysis", "equilibria"))
+    choices = _choices(scene) if scene.analysis.equilibria == "all" and scene.stopped else ()
     steps: list[Equilibrium] = []
     status, seconds = Status.SOLVED, {"model": 0.0, "solve": 0.0}
     stops: Stops = ()
     for factor, released in zip(scene.analysis.steps, scene.released_at_steps(), strict=True):
         try:
             out = tuple((name, "released" if name in released else "pulled") for name in scene.shortenings)
-            found, stops = _at_stops(scene, settings, factor, stops, out)
+            found, stops = _at_stops(scene, settings, factor, stops, out, choices)
         except SolveError as error:
             raise at_factor(error, scene, factor, steps, seconds) from None
         steps += found.steps
@@ -56,70 +57,136 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
     return Solution(scene, status, tuple(steps), seconds)
 
 
-def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops, released: Stops) -> tuple[Solution, Stops]:
-    """The answer of one factor with the directions of tendons, from the stops that the factor before it reached."""
+def _choices(scene: Scene) -> tuple[Stops, ...]:
+    """All choices of what is slack and at a stop.
+
+    Raises
+    ------
+    SceneError
+        There are too many to look for the equilibria of each.
+    """
+    parties: dict[str, list[tuple[tuple[str, str], ...]]] = {}
+    for one in unilaterals(scene):
+        parties.setdefault(f"{one.table}.{one.name}", [()]).append((one.entry,))
+    count = prod(map(len, parties.values()))
+    if count > MOST_CHOICES:
+        found = f"found 'all' with {count} choices of slack tendons and stops of springs"
+        raise SceneError(f"{found}, accepted: at most {MOST_CHOICES}, or 'one'", ("analysis", "equilibria"))
+    return tuple(switched_over(sum(parts, ()), ()) for parts in product(*parties.values()))
+
+
+MOST_CHOICES = 16
+"""Choices of what is slack and at a stop of which all equilibria are looked for."""
+
+
+def _at_stops(
+    scene: Scene, settings: Settings, factor: float, stops: Stops, released: Stops, choices: tuple[Stops, ...] = ()
+) -> tuple[Solution, Stops]:
+    """The answer of one factor with the directions of tendons, from the stops that the factor before it reached.
+
+    With ``choices`` all equilibria of these, see :func:`_all_of`.
+    """
     alone = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"steps": (factor,)})})
-    tried: set[Stops] = set()
+    if choices:
+        return _all_of(alone, settings, choices, released), ()
+    found: dict[Stops, Solution] = {}
+
+    def answer(stops: Stops) -> Margins:
+        found[stops] = solve(alone, settings, stops=(*stops, *released))
+        return margins(found[stops].last.fields)
+
+    stops = settled(scene, answer, stops)
+    return found[stops], stops
+
+
+def _all_of(alone: Scene, settings: Settings, choices: tuple[Stops, ...], released: Stops) -> Solution:
+    """The equilibria of one factor in each choice whose margins say that it holds, by rising energy.
+
+    Raises
+    ------
+    SolveError
+        No equilibrium of any choice holds; or the first error, where a choice has none.
+    """
+    steps: list[Equilibrium] = []
+    searched, first, seconds, status = 0, None, {"model": 0.0, "solve": 0.0}, Status.SOLVED
+    for choice in choices:
+        try:
+            found = solve(alone, settings, stops=(*choice, *released))
+        except SolveError as error:
+            # As where not all strings can be taut.
+            first = first or error
+            continue
+        seconds = {key: seconds[key] + found.seconds[key] for key in seconds}
+        status = found.status if status is Status.SOLVED else status
+        searched += 1
+        # What is said of the search of one choice is not true of all.
+        entries = (replace(found.steps[0], notes=found.steps[0].notes[:-1]), *found.steps[1:])
+        held = [entry for entry in entries if min(margins(entry.fields).values()) >= -NEAR]
+        # What just touches is an equilibrium with and without it.
+        steps += [entry for entry in held if not any(alike(entry, other) for other in steps)]
+    if not steps:
+        raise first or SolveError(Status.FAILED, "no choice of stops and slack tendons holds")
+    steps.sort(key=lambda entry: entry.potential)
+    note = (
+        f"looked for in each of {len(choices)} choices of slack tendons and stops, of which {searched} have any; "
+        "there may be more equilibria"
+    )
+    steps[0] = replace(steps[0], notes=(*steps[0].notes, note))
+    return Solution(alone, status, tuple(steps), seconds)
+
+
+NEAR = 1e-9
+"""Margins of all equilibria may be below zero by as much: rounding leaves less of what is zero."""
+
+
+def settled(scene: Scene, answer: Callable[[Stops], Margins], stops: Stops) -> Stops:
+    """A choice of stops and slack tendons that holds.
+
+    Parameters
+    ----------
+    scene : Scene
+    answer : callable
+        A choice -> the margins of the equilibrium in it.
+    stops : tuple of (str, str)
+        The choice to begin with.
+
+    Raises
+    ------
+    SolveError
+        No choice holds; or the first error of the equilibria, where some choice has none.
+    """
+    tried, first = set[Stops](), None
     while stops not in tried:
         tried.add(stops)
-        found = solve(alone, settings, stops=(*stops, *released))
-        change = _next_stops(found.last, stops)
+        try:
+            found = answer(stops)
+        except SolveError as error:
+            # With more constraints than a structure can meet: none is active to begin with.
+            first, stops = first or error, switched_over((), [one for one in unilaterals(scene) if one.active(())])
+            continue
+        change = next_stops(found, stops)
         if change == stops:
-            return found, stops
+            return stops
         stops = change
+    if first is not None:
+        raise first
     doubtful = sorted({stop for choice in tried for stop in choice})
     names = ", ".join(f"{'tendons' if side == 'slack' else 'springs'}.{name}" for name, side in doubtful)
     raise SolveError(Status.FAILED, f"no choice of stops and slack tendons holds: {names}")
 
 
-def _next_stops(answer: Equilibrium, stops: Stops) -> Stops:
-    """The stops without the one that pulls most or, where none does, with the one that is passed most.
+def next_stops(found: Margins, stops: Stops) -> Stops:
+    """The choice to try after one with these margins; the same where that one holds.
 
-    Tendons come first: without the slack one that is longest beyond its free length, or with the one that pushes most.
+    The stops without the one that pulls most or, where none does, with the one that is passed most.
+
+    Tendons come first: with the one that pushes most, or without the slack one that is longest beyond its free length.
     """
-    scene, known = answer.model.scene, dict(stop for stop in stops if stop[1] != "slack")
-    changed = _next_slack(answer, stops)
-    if changed != stops:
-        return changed
-    pulls = {name: _pull(answer.spring(name).stop or 0.0, side) for name, side in stops if side != "slack"}
-    if pulls and max(pulls.values()) > 0.0:
-        worst = _first_of_most(pulls)
-        return tuple(stop for stop in stops if stop[0] != worst or stop[1] == "slack")
-    passed: dict[tuple[str, str], float] = {}
-    for name, spring in scene.springs.items():
-        if spring.stop is not None and name not in known:
-            travel, (low, high) = answer.spring(name).travel, spring.stop
-            passed[name, "low"], passed[name, "high"] = low - travel, travel - high
-    if passed and max(passed.values()) > 0.0:
-        return (*stops, _first_of_most(passed))
+    for table in ("tendons", "springs"):
+        for active in (True, False):
+            wrong = {one: -margin for one, margin in found.items() if (one.table, one.active(stops)) == (table, active)}
+            if wrong and max(wrong.values()) > ROUNDING:
+                # Of those that a symmetry makes the same the first in the scene.
+                worst = first_of_largest(np.maximum(list(wrong.values()), 0.0))
+                return switched_over(stops, [list(wrong)[worst]])
     return stops
-
-
-def _next_slack(answer: Equilibrium, stops: Stops) -> Stops:
-    """The stops with the tendon that pushes most, or without the slack one that is longest beyond its free length."""
-    tendons = {name: tendon for name, tendon in answer.model.scene.tendons.items() if tendon.may_be_slack}
-    if not tendons:
-        return stops
-    slack = {name for name, side in stops if side == "slack"}
-    pushing = {name: -answer.tendon(name)["tension"] for name in tendons if name not in slack}
-    if pushing and max(pushing.values()) > ROUNDING * answer.model.scales.force:
-        return (*stops, (_first_of_most(pushing), "slack"))
-    beyond = {name: answer.fields.beyond(name) for name in tendons if name in slack}
-    if beyond and max(beyond.values()) > ROUNDING * answer.model.scales.length:
-        worst = _first_of_most(beyond)
-        return tuple(stop for stop in stops if stop != (worst, "slack"))
-    return stops
-
-
-ROUNDING = 1e-12
-"""Of tensions and lengths over the units of the model: a tendon that has next to nothing to do stays as it is."""
-
-
-def _first_of_most(found: dict[T, float]) -> T:
-    """The name of the largest number above zero; of those that a symmetry makes the same the first in the scene."""
-    return list(found)[first_of_largest(np.maximum(list(found.values()), 0.0))]
-
-
-def _pull(effort: float, side: str) -> float:
-    """How much a stop holds back instead of pushing back: a high one pushes down, a low one up."""
-    return effort if side == "high" else -effort

@@ -480,7 +480,9 @@ class Fields:
         """How much longer than its free length at this load factor a tendon of given length is, m."""
         tendon, rest = self.model.scene.tendons[name], self.balance.rest_length(name)
         pull = (tendon.pull or 0.0) if tendon.length is None else rest - tendon.length
-        factor = self.model.factors(self._applied.factor)[tendon.history]
+        factor = self._applied.factor
+        if tendon.history is not None:
+            factor = self.model.scene.histories[tendon.history].factor(factor)
         return float(self.balance.tendon(name)["length"] - rest + factor * pull)
 
     def _lay(self, touch: Touch, x: Array, rotation: Array, force: Array, moment: Array) -> None:
@@ -1067,7 +1069,20 @@ def transferred(source: Any, state: State, target: Any) -> State:
     settle(target, q, y)
     relax(target, q, y)
     lam = _by_name(source.row_names, state.lam, target.row_names)
-    return State(q, y, lam, state.unwrapped)
+    return State(q, y, lam, _counted(source, state, target))
+
+
+def _counted(source: Any, state: State, target: Any) -> Array:
+    """The angles that count turns on another model; that of a stop is the one of its spring."""
+    names, wanted = source.unwrapping.names, target.unwrapping.names
+    if names == wanted:
+        return state.unwrapped
+    known = dict(zip(names, state.unwrapped.tolist(), strict=True))
+    found = _by_name(names, state.unwrapped, wanted)
+    for i, name in enumerate(wanted):
+        if " stop of " in name:
+            found[i] = known["springs." + name.partition(" stop of ")[2]]
+    return found
 
 
 def _by_name(names: tuple[str, ...], values: Array, wanted: tuple[str, ...]) -> Array:

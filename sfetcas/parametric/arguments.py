@@ -44,6 +44,7 @@ __all__ = [
     "asked_for",
     "default_arguments",
     "in_words",
+    "refuse_idle",
     "single_numbers",
     "with_cuts",
     "with_numbers",
@@ -481,6 +482,8 @@ class Arguments:
     The numbers of the scene are symbols in the data of its model, which is assembled once: at values near those of the
     scene at which no entry vanishes by chance, so that its sparsity is that for all values.
 
+    With ``needed`` numbers on which nothing depends are refused.
+
     Attributes
     ----------
     arguments : tuple of Argument
@@ -489,6 +492,8 @@ class Arguments:
     program : Program
     defaults : ndarray (numbers,)
         Values of the scene, in its units.
+    idle : tuple of str
+        Numbers on which nothing depends.
     """
 
     def __init__(
@@ -498,6 +503,8 @@ class Arguments:
         arguments: Sequence[Argument],
         results: Results,
         prefix: str = "",
+        *,
+        needed: bool = True,
     ) -> None:
         self.arguments, self._scene = tuple(arguments), scene
         self.defaults = np.array([x for one in self.arguments for x in one.default])
@@ -523,7 +530,9 @@ class Arguments:
         self._courses: dict[str | None, _Part] = {
             name: _Part(_course(one), self._symbols, "course") for name, one in used.items()
         }
-        self._check(symbolic)
+        self.idle = self._check(symbolic)
+        if needed:
+            refuse_idle(self.idle)
         self.program = Program(self.expressions, self._varying(), prefix=prefix)
 
     def accepted(self, values: Array) -> bool:
@@ -570,8 +579,8 @@ class Arguments:
             found |= more
         return found
 
-    def _check(self, symbolic: Model) -> None:
-        """Refuse numbers that the unknowns themselves depend on, and those on which nothing depends."""
+    def _check(self, symbolic: Model) -> tuple[str, ...]:
+        """Refuse numbers that the unknowns themselves depend on; those on which nothing depends."""
         parts = [symbolic.rotations.axis, symbolic.unwrapping.axis, symbolic.unwrapping.across]
         axes = _Part(gathered(parts), self._symbols, "axes")
         for i, turns in zip(self._own, axes.numbers, strict=True):
@@ -582,10 +591,7 @@ class Arguments:
         for name, course in self._courses.items():
             if f"histories.{name}" not in self._names:
                 known = known | course.numbers
-        for i, used in zip(self._own, known, strict=True):
-            if not used:
-                message = "found a number on which nothing depends, accepted: one that the equilibrium depends on"
-                raise SceneError(message, ("arguments", self._names[i]))
+        return tuple(self._names[i] for i, used in zip(self._own, known, strict=True) if not used)
 
     def scene_at(self, values: Array) -> Scene:
         """The scene with values (numbers,) of its numbers, in its units; a load factor replaces all ``steps``."""
@@ -681,6 +687,19 @@ class Arguments:
         """A function (arguments) -> given, with a name."""
         p = ca.MX.sym("arguments", len(self.defaults))
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
+
+
+def refuse_idle(names: Sequence[str]) -> None:
+    """Refuse numbers on which nothing depends.
+
+    Raises
+    ------
+    SceneError
+        Names the first.
+    """
+    if names:
+        message = "found a number on which nothing depends, accepted: one that the equilibrium depends on"
+        raise SceneError(message, ("arguments", names[0]))
 
 
 def _loadings(model: Model) -> dict[str | None, Loading]:

@@ -15,6 +15,7 @@ from ..description.showing import shown
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
 from ..equilibria.statics import solve
+from ..equilibria.stops import solve_stopped
 from ..errors import SceneError, SolveError
 from ..mathematics.arrays import Array
 from ..mechanics.accuracy import every_other
@@ -163,6 +164,7 @@ def equilibrium_solver(
     results: Sequence[str] | None = None,
     places: Place | None = None,
     settings: Settings | None = None,
+    stopped: bool = False,
 ) -> EquilibriumSolver:
     """The solver of a scene, on the mesh that its accuracy asks for.
 
@@ -175,6 +177,7 @@ def equilibrium_solver(
     results : names of results; by default those of :func:`~sfetcas.parametric.results.default_results`
     places : fractions of the length at which results along members are given
     settings : as of :func:`~sfetcas.equilibria.statics.solve`
+    stopped : whether it is for what is taut and at a stop in the answer of statics only; else such scenes are refused
 
     Raises
     ------
@@ -182,7 +185,7 @@ def equilibrium_solver(
         A scene that cannot be exported, a number or a result that it does not have.
     """
     check_scene(scene, "export({}, ...)", steps=False)
-    refuse_search(scene)
+    refuse_search(scene, stopped=stopped)
     if scene.analysis.type == "modes":
         message = "found 'modes', accepted: static or path, whose equilibria are exported, or dynamic"
         raise SceneError(message, ("analysis", "type"))
@@ -193,7 +196,7 @@ def equilibrium_solver(
     unique = not any(note.startswith(NOT_UNIQUE) for note in answer.notes)
     names = results or default_results(base, unique=unique)
     outputs = Results(base, names, chosen_places(members, places or {}), unique=unique)
-    known = Arguments(scene, base, asked_for(scene, arguments), outputs, f"{name}_")
+    known = Arguments(scene, base, asked_for(scene, arguments), outputs, f"{name}_", needed=not stopped)
     start = None
     if prepared.lacks_slack or any(node.start is not None for node in scene.nodes.values()):
         # Straight members without slack bend to no side by themselves; a start chooses one.
@@ -224,8 +227,10 @@ NOT_UNIQUE = "reactions are not unique"
 """How a note of statics begins where closings depend on each other."""
 
 
-def refuse_search(scene: Scene, lacking: str = "not exported") -> None:
+def refuse_search(scene: Scene, lacking: str = "not exported", *, stopped: bool = False) -> None:
     """Refuse a scene whose equilibrium needs a search (contacts, stops, ...), which is not exported, or is ``lacking``.
+
+    With ``stopped`` what is taut and at a stop may have to be found.
 
     Raises
     ------
@@ -236,11 +241,11 @@ def refuse_search(scene: Scene, lacking: str = "not exported") -> None:
     if scene.contacts:
         raise SceneError(f"contact is found by a search that is {lacking}, {instead}", ("contacts",))
     for name, spring in scene.springs.items():
-        if spring.stop is not None:
+        if spring.stop is not None and not stopped:
             message = f"which stops act is found by a search that is {lacking}, {instead}"
             raise SceneError(message, ("springs", name, "stop"))
     for name, tendon in scene.tendons.items():
-        if tendon.may_be_slack:
+        if tendon.may_be_slack and not stopped:
             message = f"whether a tendon is slack is found by a search that is {lacking}, accepted: pushes = true, with"
             raise SceneError(f"{message} which it is kept as long as given, or a stiffness", ("tendons", name))
     if scene.rotating is not None:
@@ -258,13 +263,14 @@ def asked_mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium
     static = scene.analysis.model_copy(update={"type": "static", "equilibria": "one"})
     still = scene.model_copy(update={"analysis": static})
     try:
-        solution = solve(still, settings)
+        solution = (solve_stopped if still.stopped else solve)(still, settings)
     except SolveError as error:
         raise SceneError(f"the scene itself has no equilibrium: {error}, accepted: one that has") from None
     model = max((step.model for step in solution.steps), key=lambda one: one.mesh.elements)
     asked = [settings.elements or member.elements for member in scene.members.values() if member.type == "flexible"]
     # Tendons with friction are pulled or let out as at the first step.
-    mesh = replace(model.mesh, stops=())
+    stops = tuple(stop for stop in solution.last.model.mesh.stops if stop[1] not in ("released", "pulled"))
+    mesh = model.mesh if model.mesh.stops == stops else replace(model.mesh, stops=stops)
     halved = max(step.certificate.halved or 0.0 for step in solution.steps)
     if not any(asked) and halved <= (settings.accuracy or scene.analysis.accuracy):
         # Half the elements are as near as was asked for.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -17,16 +17,19 @@ from ..description.showing import shown, stability_in_words, values_in_words
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
 from ..equilibria.statics import solve
+from ..equilibria.stops import settled, solve_stopped
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
 from ..mechanics.expressions import Expressions
 from ..mechanics.fields import transferred
 from ..mechanics.model import assemble
+from ..mechanics.unilateral import Stops, Unilateral
 from ..solvers.globalised import MEANINGS, NOT_DEFINED, Code, Globalised, Outcome
 from ..solvers.prepared import Prepared
 from ..solvers.program import Program
 from .arguments import Argument, Asked, in_words
+from .choosing import Choosing
 from .equilibrium import EquilibriumSolver, Place, equilibrium_solver, refuse_search
 from .implicit import Implicit, Slopes
 from .results import Result, Results
@@ -71,25 +74,35 @@ def parametric(
     Raises
     ------
     SceneError
-        A scene with contact, stops or rotating axes; a number or an answer that it does not have; a number that changes
+        A scene with contact or rotating axes; a number or an answer that it does not have; a number that changes
         the structure of the model.
     """
     check_scene(scene, "parametric({}, ...)", steps=False)
     parameters = [parameters] if isinstance(parameters, str) else parameters
     answers = [answers] if isinstance(answers, str) else answers
-    refuse_search(scene, "without derivatives")
+    refuse_search(scene, "without derivatives", stopped=True)
     if scene.analysis.type == "modes":
         raise SceneError("found 'modes', accepted: static, or path", ("analysis", "type"))
     try:
         solver = equilibrium_solver(
-            scene, "equilibrium", arguments=parameters, results=answers, places=places, settings=settings
+            scene,
+            "equilibrium",
+            arguments=parameters,
+            results=answers,
+            places=places,
+            settings=settings,
+            stopped=scene.stopped,
         )
+        choosing = Choosing(solver) if scene.stopped else None
+        if choosing is not None:
+            choosing.check()
     except SceneError as error:
         raise _renamed(error) from None
     if not answers:
         own = [one.name for one in solver.results.results if not one.member]
         solver = solver.with_results(own)
-    return ParametricEquilibrium(solver, settings or Settings())
+        choosing = None if choosing is None else replace(choosing, first=solver)
+    return ParametricEquilibrium(solver, settings or Settings(), choosing)
 
 
 def _renamed(error: SceneError) -> SceneError:
@@ -110,10 +123,13 @@ class ParametricEquilibrium:
     ----------
     solver : EquilibriumSolver
     settings : Settings
+    choosing : Choosing or None
+        Where strings may be slack and springs have stops: the solvers of other choices of what is taut and at a stop.
     """
 
     solver: EquilibriumSolver
     settings: Settings
+    choosing: Choosing | None = None
 
     def __repr__(self) -> str:
         solver = self.solver
@@ -188,6 +204,36 @@ class ParametricEquilibrium:
             No equilibrium was found.
         """
         numbers = self.flat(values)
+        if self.choosing is not None:
+            return self._chosen(self.choosing, numbers, start)
+        return self._solved(numbers, start)
+
+    def _chosen(self, choosing: Choosing, numbers: Array, start: ParametricAnswer | None) -> ParametricAnswer:
+        """The equilibrium in a choice of what is taut and at a stop that holds, beginning with that of ``start``."""
+        known: dict[Stops, ParametricAnswer] = {}
+        last = start
+
+        def answer(stops: Stops) -> Mapping[Unilateral, float]:
+            nonlocal last
+            of = self._in(choosing, stops)
+            if last is not None and last.of.solver is not of.solver:
+                state = choosing.moved(last.of.solver, last.near(numbers), of.solver)
+                last = ParametricAnswer(of, numbers, replace(last.outcome, state=state))
+            last = known[stops] = of._solved(numbers, last)
+            return choosing.margins(of.solver, numbers, last.outcome.state)
+
+        first = self if start is None else start.of
+        return known[settled(self.solver.scene, answer, first.solver.model.mesh.stops)]
+
+    def _in(self, choosing: Choosing, stops: Stops) -> ParametricEquilibrium:
+        """The same in a choice; one for each, as it keeps the functions of its derivatives."""
+        if stops not in choosing.equilibria:
+            solver = choosing.solver(stops)
+            choosing.equilibria[stops] = self if solver is self.solver else replace(self, solver=solver)
+        return choosing.equilibria[stops]
+
+    def _solved(self, numbers: Array, start: ParametricAnswer | None) -> ParametricAnswer:
+        """The equilibrium for numbers, in the choice of the solver."""
         outcome = self._outcome(numbers, None if start is None else start.near(numbers))
         if outcome.code not in SOLVED and start is not None:
             outcome = self._outcome(numbers, None)
@@ -317,6 +363,8 @@ class ParametricAnswer:
 
     @functools.cached_property
     def _slopes(self) -> Slopes:
+        if self.of.choosing is not None:
+            self.of.choosing.refuse_doubt(self.of.solver, self.numbers, self.outcome.state)
         return self.of.implicit.slopes(self.numbers, self.outcome.state)
 
     @property
@@ -416,4 +464,5 @@ class ParametricAnswer:
         SolveError
             No equilibrium was found.
         """
-        return solve(self.of.scene_at(self.values), self.of.settings).last
+        scene = self.of.scene_at(self.values)
+        return (solve_stopped if scene.stopped else solve)(scene, self.of.settings).last

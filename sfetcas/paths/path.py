@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..description.records import counted
+from ..description.records import counted, enumerated
 from ..description.showing import error_in_words, few, first_lines, notes_in_words, shown, stability_in_words
 from ..equilibria.solution import Configuration, Equilibrium, heading, heading_in_words
 from ..errors import Status
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from ..pictures.animation import Animation
 
-__all__ = ["FLUTTER", "NO_POTENTIAL", "Branch", "FlutterPoint", "Path", "PathPoint", "ending"]
+__all__ = ["FLUTTER", "NO_POTENTIAL", "Branch", "FlutterPoint", "Path", "PathPoint", "TransitionPoint", "ending"]
 
 NO_POTENTIAL = (
     "loads without potential: no energy tells what is stable; limit points and bifurcations are where the static "
@@ -69,6 +69,30 @@ class FlutterPoint(Equilibrium):
 
 
 @dataclass(frozen=True, eq=False)
+class TransitionPoint(Equilibrium):
+    """An equilibrium at which strings go slack or become taut, or stops are reached or left: the path has a corner.
+
+    Attributes
+    ----------
+    changes : tuple of str
+        What happens along the path, as ``tendons.cable goes slack``.
+    turns : bool
+        Whether the factor turns there, as at a limit point.
+    """
+
+    changes: tuple[str, ...] = field(kw_only=True)
+    turns: bool = field(kw_only=True)
+
+    def __repr__(self) -> str:
+        head = [f"factor={self.factor:.9g}", enumerated(self.changes), self.certificate.in_words]
+        return shown(self, head, self.lines())
+
+    def to_dict(self) -> dict[str, Any]:
+        """As an entry of ``transitions`` in the JSON answer."""
+        return {**super().to_dict(), "changes": list(self.changes), "turns": self.turns}
+
+
+@dataclass(frozen=True, eq=False)
 class PathPoint:
     """One equilibrium of a path.
 
@@ -84,9 +108,11 @@ class PathPoint:
     arc : float
         Arc length from the start, see :class:`Path`.
     kind : str
-        ``""``, ``"limit point"`` or ``"bifurcation"``.
+        ``""``, ``"limit point"``, ``"bifurcation"`` or ``"transition"``, after which comes the same point again with
+        what is taut or at a stop from there on.
     prepared : Prepared, optional
-        Its own discretisation where that differs from the one of the path: in contact elements end at the contacts.
+        Its own discretisation where that differs from the one of the path: in contact elements end at the contacts, and
+        tendons that are slack and stops that are reached make other equations.
     omega, growth : ndarray (modes,), optional
         Where modes are asked for: angular frequencies, rad/s, and growth rates, 1/s, of the lowest motions.  Those that
         leave the equilibrium without oscillating come first, with frequency zero; a negative rate means decay.
@@ -125,6 +151,8 @@ class Branch:
         -1.
     flutter_points : tuple of FlutterPoint
         Where modes are asked for: points beyond which one more motion grows while it oscillates.
+    transitions : tuple of TransitionPoint
+        Where tendons go slack or become taut, and where stops of springs are reached or left.
     """
 
     points: tuple[PathPoint, ...] = field(repr=False)
@@ -135,6 +163,7 @@ class Branch:
     bifurcation: int = 0
     side: int = 0
     flutter_points: tuple[FlutterPoint, ...] = ()
+    transitions: tuple[TransitionPoint, ...] = ()
 
     def __repr__(self) -> str:
         return shown(self, [self.name, counted(len(self.points), "point")], self.lines())
@@ -152,7 +181,8 @@ class Branch:
             if factors:
                 number = counted(len(factors), kind.replace("_", " ")[:-1])
                 lines.append(f"{number}: factor {few(factors)}")
-        return lines
+        told = [f"{enumerated(entry.changes)} at factor {entry.factor:.9g}" for entry in self.transitions]
+        return [*lines, few(told)] if told else lines
 
     @property
     def factors(self) -> Array:
@@ -255,6 +285,11 @@ class Path:
         """Flutter points of the path, then of the branches."""
         return tuple(entry for branch in self.branches for entry in branch.flutter_points)
 
+    @property
+    def transitions(self) -> tuple[TransitionPoint, ...]:
+        """Transitions of the path, then of the branches."""
+        return tuple(entry for branch in self.branches for entry in branch.transitions)
+
     def fields(self, point: PathPoint) -> Fields:
         """Positions, forces and moments at a point of the path or a branch, by name."""
         return Fields((point.prepared or self.prepared).equations, point.state, point.loading)
@@ -286,7 +321,7 @@ class Path:
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer as nested dictionaries."""
         answer: dict[str, Any] = {**heading(self, self.model), "path": self._arrays(self.main)}
-        for kind in ("steps", "limit_points", "bifurcations", "flutter_points"):
+        for kind in ("steps", "limit_points", "bifurcations", "flutter_points", "transitions"):
             entries = [
                 {**entry.to_dict(), "branch": i}
                 for i, branch in enumerate(self.branches)
@@ -334,5 +369,6 @@ def ending(end: str, factor: float, count: int, message: str) -> str:
         "points": f"{count} points",
         "closed": "it closes on itself",
         "lost": f"it could not be followed beyond factor {factor:.6g}",
+        "margin": f"it ends at factor {factor:.6g}: {message}",
         "bent": f"beyond factor {factor:.6g} {limit.value} ({message})",
     }[end]

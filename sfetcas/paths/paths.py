@@ -9,7 +9,7 @@ bifurcations of a symmetric structure apart.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -27,15 +27,17 @@ from ..mechanics.displacements import Displacements
 from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
+from ..mechanics.unilateral import Stops
 from ..solvers.arclength import Curve, Standing, Tangent
-from ..solvers.beginning import begin_path, check_slack
-from ..solvers.critical import Event, at_factors, shapes_at
+from ..solvers.beginning import check_slack
+from ..solvers.critical import Event, shapes_at
 from ..solvers.prepared import Prepared
 from ..solvers.redundancy import with_sharing
 from ..solvers.residuals import relative_residual
-from ..solvers.tracing import Traced, full_shape, passes, switched, trace, without
+from ..solvers.tracing import full_shape, passes, switched
 from .contact_path import MARGIN, STEADY, follow_in_contact
-from .path import NO_POTENTIAL, Branch, Path, PathPoint, ending
+from .path import NO_POTENTIAL, Branch, Path, PathPoint, TransitionPoint, ending
+from .switching import Choices, Followed, Transition
 from .vibrations import shaken, with_modes
 
 __all__ = ["buckling_mode", "follow_path", "switch"]
@@ -121,11 +123,11 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
         raise SceneError(f"side: found {side}, accepted: 1 or -1")
     curve, event = _bifurcation_of(path, bifurcation, shape)
     run = PathTracing(path.scene, Settings())
-    traced = run.branch(curve, event, side, shape, points or path.scene.analysis.points)
-    if traced is None:
+    choices = run.choices(curve.model.mesh, path.unit)
+    found = run.branch(choices, curve, event, side, shape, points or path.scene.analysis.points)
+    if found is None:
         raise SolveError(Status.FAILED, f"no branch found at bifurcation {bifurcation}")
-    stretch = run.stretch(_Stretch(traced, bifurcation, side), curve)
-    branch = run.answered(curve, stretch, {})
+    branch = run.answered(path.prepared, run.stretch(_Stretch(found, bifurcation, side), choices), {})
     return branch if path.massive is None else shaken(path, branch)
 
 
@@ -162,8 +164,8 @@ def _bifurcation_of(path: Path, bifurcation: int, shape: int) -> tuple[Curve, Ev
         raise SceneError("bifurcation: the path has none, accepted: a path with bifurcations")
     if not 1 <= bifurcation <= count:
         raise SceneError(f"bifurcation: found {bifurcation}, accepted: 1 to {count}, those of the path")
-    curve = Curve(path.prepared, path.unit)
     number = [i for i, point in enumerate(path.points) if point.kind == "bifurcation"][bifurcation - 1]
+    curve = Curve(path.points[number].prepared or path.prepared, path.unit)
     event = _event_at(curve, path, number)
     if not 1 <= shape <= event.multiplicity:
         raise SceneError(f"shape: found {shape}, accepted: 1 to {event.multiplicity}, those that vanish there")
@@ -181,14 +183,21 @@ def _event_at(curve: Curve, path: Path, number: int) -> Event:
 
 @dataclass
 class _Stretch:
-    """A traced stretch, and the crossings of the factors asked for."""
+    """What was followed from the start or a bifurcation on, and the crossings of the factors asked for."""
 
-    traced: Traced
+    traced: Followed
     bifurcation: int = 0
     side: int = 0
     crossings: list[Standing] = field(default_factory=list)
 
+    def leads_through(self, curve: Curve, point: Standing) -> bool:
+        """Whether it leads through an equilibrium on a curve."""
+        stops = curve.model.mesh.stops
+        return any(passes(curve, p.traced, point) for p in self.traced.parts if p.curve.model.mesh.stops == stops)
+
     def of_kind(self, kind: str) -> list[Standing]:
+        if kind == "transition":
+            return [transition.standing for transition in self.traced.transitions]
         return [event.standing for event in self.traced.events if event.kind == kind]
 
 
@@ -196,6 +205,7 @@ class _Stretch:
 class _Level:
     """What was followed on one mesh."""
 
+    choices: Choices
     curve: Curve
     stretches: list[_Stretch]
     notes: tuple[str, ...]
@@ -230,6 +240,7 @@ class PathTracing:
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.assembly: Any = settings.assembly
         self.model: Model | None = None
+        self.stops: Stops = ()
         knots = {t for h in scene.histories.values() for t in h.knots if self.span[0] < t < self.span[1]}
         self.knots = tuple(sorted(knots))
 
@@ -275,8 +286,9 @@ class PathTracing:
         plain, graded = self._mesh((1e-9 * self._widest,)), self._mesh(self.span)
         if graded.elements <= max(2 * plain.elements, FEW_ELEMENTS):
             return graded
-        curve, start, _ = begin_path(self._prepared(plain), self.span)
-        met = [point.factor for point in trace(curve, start, self.span, self.analysis.points, self.knots).points]
+        choices = self.choices(plain)
+        curve, start, _ = choices.begin()
+        met = [point.factor for point in choices.follow(curve, start, self.analysis.points).points]
         return self._mesh((max(1.5 * min(met), self.span[0]), min(1.5 * max(met), self.span[1])))
 
     def _mesh(self, factors: tuple[float, ...]) -> Mesh:
@@ -284,6 +296,12 @@ class PathTracing:
         steps = tuple(factor for factor in factors if factor) or (self._widest,)
         analysis = self.analysis.model_copy(update={"steps": steps})
         return pilot_of(self.scene.model_copy(update={"analysis": analysis}), self.settings)
+
+    def choices(self, mesh: Mesh, unit: float | None = None) -> Choices:
+        """The models of a mesh, with the ``unit`` of a path that is known already."""
+        found = Choices(mesh, self._prepared, self.span, self.knots)
+        found.unit = unit or found.unit
+        return found
 
     def _prepared(self, mesh: Mesh) -> Prepared:
         begin = time.perf_counter()
@@ -300,59 +318,60 @@ class PathTracing:
         return mesh.refined(marks)
 
     def _level(self, mesh: Mesh) -> _Level:
-        curve, start, notes = begin_path(self._prepared(mesh), self.span)
-        main = _Stretch(trace(curve, start, self.span, self.analysis.points, self.knots))
+        choices = self.choices(mesh)
+        curve, start, notes = choices.begin(self.stops)
+        main = _Stretch(choices.follow(curve, start, self.analysis.points))
         way = max(abs(point.factor - start.factor) for point in main.traced.points)
         if main.traced.end == "bent" and way < LEAST_WAY * self._widest:
             raise SolveError(Status.BENT, main.traced.message, start.state)
         if main.traced.end == "lost" and way < LEAST_WAY * self._widest:
             detail = f"the path cannot be followed beyond factor {main.traced.points[-1].factor:.3g}"
             raise SolveError(Status.FAILED, detail, start.state)
-        check_slack(curve, main.traced)
-        level = _Level(curve, [main], notes)
-        bends = [event for event in main.traced.events if event.kind == "bifurcation"]
-        for number, event in enumerate(bends[: self.analysis.branches], start=1):
+        self.stops = curve.model.mesh.stops
+        for part in (part for part in main.traced.parts if len(part.traced.points) > 1):
+            check_slack(part.curve, part.traced)
+        level = _Level(choices, curve, [main], notes)
+        bends = [(part.curve, e) for part in main.traced.parts for e in part.traced.events if e.kind == "bifurcation"]
+        for number, (on, event) in enumerate(bends[: self.analysis.branches], start=1):
             for side in (1, -1):
-                self._add_branch(level, event, number, side)
+                self._add_branch(level, on, event, number, side)
         level.notes += _beside(main.traced.near)
-        level.stretches = [self.stretch(part, curve) for part in level.stretches]
+        level.stretches = [self.stretch(part, choices) for part in level.stretches]
         return level
 
-    def _add_branch(self, level: _Level, event: Event, number: int, side: int) -> None:
+    def _add_branch(self, level: _Level, curve: Curve, event: Event, number: int, side: int) -> None:
         """Follow the branch at a bifurcation to one side, unless a stretch that was followed leads along there."""
-        first = switched(level.curve, event, shapes_at(level.curve, event), side)
+        first = switched(curve, event, shapes_at(curve, event), side)
         if first is None:
             level.notes += (f"no branch was found at bifurcation {number} to the side {side}",)
             return
         if not self._in_range(first):
             level.notes += (f"bifurcation {number} to the side {side}: the branch leaves the range at once",)
             return
-        along = next((part for part in level.stretches if passes(level.curve, part.traced, first)), None)
+        along = next((part for part in level.stretches if part.leads_through(curve, first)), None)
         if along is not None:
             which = f"branch {level.stretches.index(along)}" if along.bifurcation else "the path itself"
             level.notes += (f"bifurcation {number} to the side {side}: {which} leads along there and is listed once",)
             return
         known = [standing for part in level.stretches for standing in part.of_kind("bifurcation")]
-        traced = trace(level.curve, first, self.span, self.analysis.points, self.knots)
-        level.stretches.append(_Stretch(without(traced, known), number, side))
+        followed = level.choices.follow(curve, first, self.analysis.points)
+        level.stretches.append(_Stretch(followed.without(known), number, side))
 
-    def branch(self, curve: Curve, event: Event, side: int, shape: int, points: int) -> Traced | None:
+    def branch(
+        self, choices: Choices, curve: Curve, event: Event, side: int, shape: int, points: int
+    ) -> Followed | None:
         """The branch at a bifurcation to one side; None where Newton's method finds none within the range."""
         first = switched(curve, event, shapes_at(curve, event), side, shape)
         if first is None or not self._in_range(first):
             return None
-        return without(trace(curve, first, self.span, points, self.knots), [event.standing])
+        return choices.follow(curve, first, points).without([event.standing])
 
     def _in_range(self, standing: Standing) -> bool:
         return self.span[0] <= standing.factor <= self.span[1]
 
-    def stretch(self, part: _Stretch, curve: Curve) -> _Stretch:
+    def stretch(self, part: _Stretch, choices: Choices) -> _Stretch:
         """A traced branch with the equilibria at the factors of ``analysis.steps`` added."""
-        points = part.traced.points
-        crossings = at_factors(curve, points, self.analysis.steps)
-        # A closed curve ends where it begins.
-        again = part.traced.end == "closed" and points[-1] in crossings
-        return replace(part, crossings=crossings[:-1] if again else crossings)
+        return replace(part, crossings=choices.crossings(part.traced, self.analysis.steps))
 
     # -- errors ---------------------------------------------------------------------------------
 
@@ -362,7 +381,7 @@ class PathTracing:
         if len(coarse.stretches) != len(fine.stretches):
             errors[0, "branches", 0] = np.inf
         for i, (a, b) in enumerate(zip(coarse.stretches, fine.stretches, strict=False)):
-            for kind in ("limit", "bifurcation", "step"):
+            for kind in ("limit", "bifurcation", "transition", "step"):
                 ours, theirs = (s.crossings if kind == "step" else s.of_kind(kind) for s in (a, b))
                 if len(ours) != len(theirs):
                     errors[i, kind, -1] = np.inf
@@ -376,17 +395,18 @@ class PathTracing:
     def _widest(self) -> float:
         return max(map(abs, self.span))
 
-    def _sampled(self, coarse: _Level, traced: Traced, fine: _Level) -> float:
+    def _sampled(self, coarse: _Level, traced: Followed, fine: _Level) -> float:
         """Largest difference of points of a coarse stretch when they are corrected on the fine mesh."""
-        curve = coarse.curve
-        steady = [p for p in traced.points if abs(p.tangent.factor) >= STEADY * curve.unit and not p.inertia.zero]
+        unit = coarse.curve.unit
+        steady = [p for p in traced.points if abs(p.tangent.factor) >= STEADY * unit and not p.inertia.zero]
         chosen = np.unique(np.linspace(0, len(steady) - 1, SAMPLES).round().astype(int)).tolist() if steady else []
         largest = 0.0
         for i in chosen:
-            state = transferred(curve.model, steady[i].state, fine.curve.model)
-            flat = Tangent(np.zeros(fine.curve.equations.total), steady[i].tangent.factor)
+            curve = fine.choices.curve(steady[i].model.mesh.stops)
+            state = transferred(steady[i].model, steady[i].state, curve.model)
+            flat = Tangent(np.zeros(curve.equations.total), steady[i].tangent.factor)
             here = replace(steady[i], state=state, tangent=flat)
-            found = fine.curve.at_factor(here, steady[i].factor)
+            found = curve.at_factor(here, steady[i].factor)
             if found is not None:
                 largest = max(largest, largest_difference(steady[i].fields, found.fields))
         return largest
@@ -398,9 +418,9 @@ class PathTracing:
         branches = []
         for i, stretch in enumerate(level.stretches):
             own = {(kind, j): error for (k, kind, j), error in errors.items() if k == i}
-            branches.append(self.answered(curve, stretch, own))
+            branches.append(self.answered(curve.prepared, stretch, own))
         status = Status.SHORT if largest > self.accuracy and self.asked else Status.SOLVED
-        if level.stretches[0].traced.end in ("lost", "bent"):
+        if level.stretches[0].traced.end in ("lost", "bent", "margin"):
             status = Status.CUT
         final = level.stretches[-1].traced.points[-1]
         steps = [entry for branch in branches for entry in branch.steps]
@@ -418,12 +438,13 @@ class PathTracing:
             seconds=self.seconds,
         )
 
-    def answered(self, curve: Curve, stretch: _Stretch, errors: dict[tuple[str, int], float]) -> Branch:
-        """A traced branch as a :class:`Branch`, with the estimated errors of its points."""
+    def answered(self, prepared: Prepared, stretch: _Stretch, errors: dict[tuple[str, int], float]) -> Branch:
+        """A traced branch as a :class:`Branch`, with the estimated errors of its points, on a path of ``prepared``."""
         traced = stretch.traced
-        kinds = {id(event.standing): event for event in traced.events}
-        energy = curve.model.conservative
-        points = tuple(_point(p, kinds.get(id(p)), energy) for p in traced.points)
+        kinds: dict[int, str] = {id(event.standing): event.kind for event in traced.events}
+        kinds |= {id(transition.standing): "transition" for transition in traced.transitions}
+        energy = prepared.model.conservative
+        points = tuple(_point(p, kinds.get(id(p), ""), energy, prepared) for p in traced.points)
 
         def entries(kind: str, standings: list[Standing], notes: list[tuple[str, ...]]) -> tuple[Equilibrium, ...]:
             numbered = zip(standings, notes, strict=True)
@@ -436,10 +457,18 @@ class PathTracing:
             steps=entries("step", crossings, [()] * len(crossings)),
             limit_points=entries("limit", [e.standing for e in limits], [_said(e, energy) for e in limits]),
             bifurcations=entries("bifurcation", [e.standing for e in bends], [_said(e, energy) for e in bends]),
-            end=ending(traced.end, traced.points[-1].factor, len(traced.points) - len(traced.events), traced.message),
+            end=ending(traced.end, traced.points[-1].factor, traced.count, traced.message),
             bifurcation=stretch.bifurcation,
             side=stretch.side,
+            transitions=tuple(
+                self._transition(t, errors.get(("transition", j))) for j, t in enumerate(traced.transitions)
+            ),
         )
+
+    def _transition(self, transition: Transition, error: float | None) -> TransitionPoint:
+        entry = self._entry(transition.standing, error, transition.notes)
+        parts = {part.name: getattr(entry, part.name) for part in fields(entry)}
+        return TransitionPoint(**parts, changes=transition.changes, turns=transition.turns)
 
     @staticmethod
     def _entry(at: Standing, error: float | None, notes: tuple[str, ...]) -> Equilibrium:
@@ -456,7 +485,8 @@ def _disagreement(coarse: _Level, fine: _Level) -> tuple[str, ...]:
     found = [f"{counts[0]} and {counts[1]} branches"] if counts[0] != counts[1] else []
     for i, parts in enumerate(zip(coarse.stretches, fine.stretches, strict=False)):
         where = f" of branch {i}" if i else ""
-        for kind, name in (("limit", "limit points"), ("bifurcation", "bifurcations")):
+        for kind in ("limit", "bifurcation", "transition"):
+            name = f"{kind} points" if kind == "limit" else f"{kind}s"
             a, b = (len(part.of_kind(kind)) for part in parts)
             found += [f"{a} and {b} {name}{where}"] if a != b else []
         a, b = (len(part.crossings) for part in parts)
@@ -475,11 +505,12 @@ def _beside(near: tuple[float, ...]) -> tuple[str, ...]:
     )
 
 
-def _point(standing: Standing, event: Event | None, has_energy: bool) -> PathPoint:
+def _point(standing: Standing, kind: str, has_energy: bool, prepared: Prepared) -> PathPoint:
     negative, zero = (standing.inertia.negative, standing.inertia.zero) if has_energy else (0, 0)
     stable: bool | str = (False if negative else "neutral" if zero else True) if has_energy else "not defined"
-    kind = "" if event is None else {"limit": "limit point"}.get(event.kind, event.kind)
-    return PathPoint(float(standing.factor), standing.state, standing.loading, negative, stable, standing.arc, kind)
+    kind, at = {"limit": "limit point"}.get(kind, kind), float(standing.factor)
+    own = None if standing.prepared is prepared else standing.prepared
+    return PathPoint(at, standing.state, standing.loading, negative, stable, standing.arc, kind, own)
 
 
 def _said(event: Event, has_energy: bool) -> tuple[str, ...]:

@@ -49,7 +49,7 @@ __all__ = ["chart", "save_chart"]
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#8F3B76", "#CC9900", "#555555")
 STYLES: dict[str, Any] = {"True": "-", "False": "--", "neutral": "-.", "not defined": ":"}
 KINDS = ((True, "stable"), (False, "unstable"), ("neutral", "neutral"), ("not defined", "stability not defined"))
-MARKS = {"limit point": "o", "bifurcation": "s"}
+MARKS = {"limit point": "o", "bifurcation": "s", "transition": "^"}
 FREQUENCY, FLUTTERING = "angular frequency", "d"
 """Of the lowest motions, and the mark where one of them starts to grow."""
 LOADED = 5.0
@@ -292,7 +292,7 @@ def _draw_branch(axes: Axes, branch: Branch, values: Array, colour: str, *, upri
 def _smooth(branch: Branch, first: int, last: int, places: Array) -> Array:
     """Places (n, 2) of the points from the ``first`` to the ``last``, with others on cubics over the arc between them.
 
-    In contact, whose points have meshes of their own, a path may have corners: lines are straight.
+    In contact, and where strings go slack or stops are reached, a path may have corners: lines are straight.
     """
     part = slice(first, last + 1)
     arcs = np.array([point.arc for point in branch.points])

@@ -7,7 +7,7 @@ then it may have jumped over a fold or to another branch.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -17,7 +17,7 @@ from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import State
 from .arclength import PASSING, Curve, Standing, Tangent
 from .continuation import advanced
-from .critical import LARGEST_PRIMAL_FACTOR, Event, events_between
+from .critical import LARGEST_PRIMAL_FACTOR, ONE_EVENT, Event, events_between, sought
 from .newton import largest_rotation
 from .residuals import relative_residual
 
@@ -71,6 +71,12 @@ ONE_POINT = 1e-5
 WALKS = 6
 """Steps of Newton's method along a curve to the place next to a point."""
 
+CROSSED = 1e-9
+"""A margin is below zero where it is by more than this: rounding leaves less of one that stays zero."""
+
+UNCLEAR = 1e-7
+"""Where a margin is to vanish it is below this: rounding leaves far less, even of reactions of stiff structures."""
+
 MEETING = 1e-3
 """Bifurcations on two curves are one within this, rad: rounding moves them along the shape that is open there."""
 
@@ -86,12 +92,14 @@ class Traced:
     events : list of Event
     end : str
         Why it ends: ``range`` (the factor leaves it), ``points`` (as many as asked for), ``closed`` (the last point is
-        the first one again), ``lost`` (no further point was found), or ``bent`` (a small member beyond linear
-        elasticity).
+        the first one again), ``lost`` (no further point was found), ``bent`` (a small member beyond linear
+        elasticity), or ``margin`` (one that is watched is zero at the last point).
     message : str
         Where it ends ``bent``: a sentence that names the member and its deformation.
     near : tuple of float
         Factors at which it comes so near to another curve that a step led there at first.
+    crossed : tuple of int
+        Where it ends ``margin``: which of the margins are zero there and below beyond it.
     """
 
     points: list[Standing]
@@ -99,14 +107,21 @@ class Traced:
     end: str
     message: str = ""
     near: tuple[float, ...] = ()
+    crossed: tuple[int, ...] = ()
 
 
 def trace(
-    curve: Curve, start: Standing, span: tuple[float, float], count: int, knots: tuple[float, ...] = ()
+    curve: Curve,
+    start: Standing,
+    span: tuple[float, float],
+    count: int,
+    knots: tuple[float, ...] = (),
+    watch: Callable[[Standing], Array] | None = None,
 ) -> Traced:
     """Follow a curve from a point until the factor leaves the span, or for so many points.
 
-    At the knots of histories the curve has a corner: it is followed from one to the next.
+    At the knots of histories the curve has a corner: it is followed from one to the next.  ``watch`` gives the margins
+    of a point (n,), dimensionless: where one of them falls below zero the curve ends.
     """
     usual = start.inertia.zero
     start = curve.without_neutral(start) if usual and start.tangent.neutral is None else start
@@ -124,13 +139,13 @@ def trace(
             now = here.standing(now.state, now.factor, along, arc=now.arc, iterations=now.iterations)
         stride = (span[1] - span[0]) / SHARE
         more = count - len(traced.points) + len(traced.events)
-        part = _Piece(here, ahead[0], stride, more, here.searched + max(SEARCHED, more), [now]).traced()
+        part = _Piece(here, ahead[0], stride, more, here.searched + max(SEARCHED, more), [now], watch=watch).traced()
         # A path that touches the end of its range may be singular there, and rounding puts that beyond.
         events = [event for event in part.events if span[0] <= event.standing.factor <= span[1]]
         outside = {id(event.standing) for event in part.events} - {id(event.standing) for event in events}
         points = [point for point in part.points[1:] if id(point) not in outside]
         near = traced.near + part.near
-        traced = Traced(traced.points + points, traced.events + events, part.end, part.message, near)
+        traced = Traced(traced.points + points, traced.events + events, part.end, part.message, near, part.crossed)
     return _with_crossed_folds(traced, usual)
 
 
@@ -216,11 +231,14 @@ class _Piece:
     end: str = ""
     message: str = ""
     near: list[float] = field(default_factory=list)
+    watch: Callable[[Standing], Array] | None = None
+    crossed: tuple[int, ...] = ()
 
     def traced(self) -> Traced:
         """The stretch from its first point on."""
         _, arrived = advanced(self.points[0], FIRST, self.trial, lambda _: self.ended(), shortest=SHORTEST)
-        return Traced(self.points, self.events, self.end if arrived else "lost", self.message, tuple(self.near))
+        end, near = self.end if arrived else "lost", tuple(self.near)
+        return Traced(self.points, self.events, end, self.message, near, self.crossed if end == "margin" else ())
 
     def ended(self) -> bool:
         """Whether no further step is to be taken; ``end`` says why not."""
@@ -234,14 +252,18 @@ class _Piece:
         """The next point, None if the step is refused, and the length of the next step."""
         curve, length = self.curve, min(length, _longest(self.curve, now, self.stride))
         there, left = _ahead(curve, now, self.before, length, self.span)
+        there = None if there is None else self._within_margins(now, there)
         if there is None:
             return None, 0.5 * length
+        if there is now:
+            self.end = "margin"
+            return there, 0.0
         self.message = curve.too_large(there)
         if self.message:
             self.end = "bent"
             return there, 0.0
         start, last = self.points[0], self.points[-1]
-        closed = not left and len(self.points) >= LOOP and _closes(curve, start, now, there)
+        closed = not (left or self.crossed) and len(self.points) >= LOOP and _closes(curve, start, now, there)
         ends = _to_start(curve, start, now, there) if closed else [there]
         between = [events_between(curve, *pair) for pair in pairwise([last, *ends])]
         if None in between:
@@ -255,9 +277,27 @@ class _Piece:
             met = [event for event in events or [] if event.standing is not self.points[-1]]
             self.events += met
             self.points += [event.standing for event in met if event.standing is not end] + [end]
-        self.end = "range" if left else "closed" if closed else ""
+        self.end = "margin" if self.crossed else "range" if left else "closed" if closed else ""
         self.before, self.more = now, self.more - 1
         return there, 0.0 if self.end else length * _growth(curve, now, there)
+
+    def _within_margins(self, now: Standing, there: Standing) -> Standing | None:
+        """The point at the end of a step, or the first one before it at which a margin vanishes; None if not found."""
+        self.crossed, watch = (), self.watch
+        if watch is None:
+            return there
+        found: dict[int, Standing] = {}
+        for i in np.flatnonzero(watch(there) < -CROSSED).tolist():
+            zero = sought(self.curve, now, there, lambda standing, i=i: float(watch(standing)[i]))  # type: ignore[misc]
+            if zero is None or abs(watch(zero)[i]) > UNCLEAR:
+                return None
+            found[i] = zero
+        if not found:
+            return there
+        first = min(found.values(), key=lambda standing: standing.arc)
+        together = first.arc + ONE_EVENT * (there.arc - now.arc)
+        self.crossed = tuple(i for i, standing in found.items() if standing.arc <= together)
+        return first
 
 
 def _closes(curve: Curve, start: Standing, now: Standing, there: Standing) -> bool:

@@ -132,6 +132,7 @@ def _of_path(path: Path) -> Observation:
         "limit point": path.limit_points,
         "bifurcation": path.bifurcations,
         "flutter point": path.flutter_points,
+        "transition": path.transitions,
     }
     for kind, points in critical.items():
         for i, point in enumerate(points):

@@ -1,0 +1,166 @@
+"""Equilibria as functions of parameters where strings may be slack and springs may stand at their stops.
+
+For each choice of what is taut and at a stop, see :mod:`~sfetcas.mechanics.unilateral`, there is a solver of its own;
+which choice holds for given numbers is found as in statics.  Multipliers of active constraints are unknowns of the
+choice, gaps of the others are the residuals of their rows in a model in which they are active.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..errors import SolveError, Status
+from ..mathematics.arrays import Array
+from ..mechanics.fields import transferred
+from ..mechanics.model import Model, assemble
+from ..mechanics.unilateral import Stops, Unilateral, unilaterals
+from .arguments import Arguments, refuse_idle
+from .equilibrium import EquilibriumSolver
+from .results import Results
+
+__all__ = ["Choosing"]
+
+STRICT = 1e-7
+"""Margins, dimensionless, that are as small leave it to a change of a number to which side of a change it leads."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Gauge:
+    """A model in which constraints are active, for the residuals of their rows.
+
+    Attributes
+    ----------
+    arguments : Arguments
+    prepare : Function
+        (arguments) -> given.
+    gaps : Function
+        (state, given) -> residuals of all rows.
+    """
+
+    arguments: Arguments
+    prepare: ca.Function
+    gaps: ca.Function
+
+
+@dataclass(frozen=True, eq=False)
+class Choosing:
+    """The solvers of one scene on one mesh, by choice.
+
+    Attributes
+    ----------
+    first : EquilibriumSolver
+        That of the choice of the answer of statics.
+    equilibria : dict
+        What is kept of each choice by who asks for it.
+    """
+
+    first: EquilibriumSolver
+    equilibria: dict[Stops, Any] = field(default_factory=dict)
+
+    @functools.cached_property
+    def constraints(self) -> tuple[Unilateral, ...]:
+        """The unilateral constraints of the scene."""
+        return unilaterals(self.first.scene)
+
+    def solver(self, stops: Stops) -> EquilibriumSolver:
+        """The solver of a choice, made anew but for the first."""
+        first = self.first
+        if stops == first.model.mesh.stops:
+            return first
+        base = self._assembled(stops)
+        names = [one.name for one in first.results.results]
+        results = Results(base, names, first.results.places, unique=first.unique)
+        arguments = Arguments(first.scene, base, first.arguments.arguments, results, f"{first.name}_", needed=False)
+        solver = replace(first, arguments=arguments, results=results, start=None)
+        return solver if first.start is None else replace(solver, start=self.moved(first, first.start, solver))
+
+    def _assembled(self, stops: Stops) -> Model:
+        model = self.first.model
+        mesh = replace(model.mesh, stops=stops)
+        return assemble(self.first.scene, mesh, assembly=model.assembly, scales=model.scales)  # type: ignore[arg-type]
+
+    @staticmethod
+    def moved(one: EquilibriumSolver, state: Array, other: EquilibriumSolver) -> Array:
+        """A flat state of one solver for another one."""
+        if one is other:
+            return state
+        there = transferred(one.model, one.arguments.program.state(state), other.model)
+        return other.arguments.program.flat(there)
+
+    # -- margins --------------------------------------------------------------------------------
+
+    def margins(self, solver: EquilibriumSolver, numbers: Array, flat: Array) -> Mapping[Unilateral, float]:
+        """The margin of each constraint, dimensionless, at an equilibrium for numbers (numbers,)."""
+        model, state = solver.model, solver.arguments.program.state(flat)
+        stops, found = model.mesh.stops, dict[Unilateral, float]()
+        gaps = {side: self._gaps(side, model, numbers, state) for side in self._sides}
+        for one in self.constraints:
+            if one.active(stops):
+                multiplier = float(state.lam[model.row_names.index(_row(one))])
+                found[one] = -multiplier if one.side == "low" else multiplier
+            else:
+                beyond = gaps["low" if one.side == "low" else self._sides[-1]][_row(one)]
+                found[one] = beyond if one.side == "low" else -beyond
+        return found
+
+    @property
+    def _sides(self) -> tuple[str, ...]:
+        """Which stops are active in the models that tell gaps, beside all tendons."""
+        return ("low", "high") if any(one.table == "springs" for one in self.constraints) else ("low",)
+
+    def _gaps(self, side: str, model: Model, numbers: Array, state: object) -> dict[str, float]:
+        gauge = self._gauges[side]
+        program = gauge.arguments.program
+        there = transferred(model, state, gauge.arguments.model)  # type: ignore[arg-type]
+        residual = np.array(gauge.gaps(program.flat(there), gauge.prepare(numbers))).ravel()
+        return dict(zip(gauge.arguments.model.row_names, residual.tolist(), strict=True))
+
+    @functools.cached_property
+    def _gauges(self) -> dict[str, _Gauge]:
+        found = {}
+        for side in self._sides:
+            stops = tuple(one.entry for one in self.constraints if one.side == side)
+            base, first = self._assembled(stops), self.first
+            results = Results(base, [], {}, unique=first.unique)
+            arguments = Arguments(first.scene, base, first.arguments.arguments, results, needed=False)
+            program = arguments.program
+            rows = ca.densify(program.forces.residual[program.equations.unknowns :])
+            gaps = ca.Function("gaps", [program.state_symbol, program.symbol], [rows])
+            found[side] = _Gauge(arguments, arguments.prepare("prepare"), gaps)
+        return found
+
+    def check(self) -> None:
+        """Refuse numbers on which nothing depends, whatever is taut and at a stop.
+
+        Raises
+        ------
+        SceneError
+            Names the first.
+        """
+        others = [gauge.arguments.idle for gauge in self._gauges.values()]
+        refuse_idle([name for name in self.first.arguments.idle if all(name in idle for idle in others)])
+
+    def refuse_doubt(self, solver: EquilibriumSolver, numbers: Array, flat: Array) -> None:
+        """Refuse derivatives where they differ to the sides of a change.
+
+        Raises
+        ------
+        SolveError
+            A constraint has no margin; names it.
+        """
+        stops = solver.model.mesh.stops
+        for one, margin in self.margins(solver, numbers, flat).items():
+            if margin <= STRICT:
+                detail = f"{one.becomes(stops)} there, and derivatives differ to either side"
+                raise SolveError(Status.SINGULAR, detail)
+
+
+def _row(one: Unilateral) -> str:
+    """Name of the row of a constraint where it is active."""
+    return f"{one.table}.{one.name}" + (".stop" if one.table == "springs" else "")
