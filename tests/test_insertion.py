@@ -413,6 +413,13 @@ def test_refused_ranges():
         ),
         (
             {
+                "members.m.insertion": 0.1,
+                "springs.s": {"type": "translational", "node": "B", "direction": [0, 1, 0], "stiffness": 1.0},
+            },
+            "found the translational spring 's', accepted: none beside a member that grows",
+        ),
+        (
+            {
                 "histories.h": {"t": [0, 1, 2], "polynomial": [[0, 0.5], [0.8, 0.1]]},
                 "tubes.t.insertion_history": "h",
             },

@@ -143,9 +143,13 @@ def _check_growing(scene: Any, name: str) -> None:
         for key, acting in getattr(scene, table).items():
             if acting.member == name:
                 raise SceneError(f"found {table}.{key} along it, {accepted}", where)
-    for key, tendon in scene.tendons.items():
-        if any(way.member == name for way in tendon.way):
-            raise SceneError(f"found the tendon {key!r} along it, {accepted}", where)
+    # Their lengths without force are those of the undeformed scene, which changes as the member grows.
+    for key in scene.tendons:
+        raise SceneError(f"found the tendon {key!r}, accepted: none beside a member that grows", where)
+    for key, spring in scene.springs.items():
+        if spring.type == "translational":
+            message = f"found the translational spring {key!r}, accepted: none beside a member that grows"
+            raise SceneError(message, where)
     beyond = _beyond(scene, name)
     if first in beyond:
         message = f"found with members that lead from {last!r} back to {first!r}, accepted: a free way outwards"

@@ -292,10 +292,9 @@ class InsertionSteps:
                 solved = way.followed(solved)
                 snaps += way.snaps
         notes = tuple(f"snapped at {self.place(snap)}: {JUMPED}" for snap in snaps)
-        if not solved.model.conservative:
-            notes += (NO_ENERGY,)
         way_there = ("growing", *("left",) * bool(snaps))
-        notes = (*found.notes, *notes)
+        # What is said of the tangent at factor 0 does not hold of the whole way.
+        notes = (*found.notes, *notes) if solved.model.conservative else (NO_ENERGY,)
         return EquilibriumResult(solved, solved.stability, notes, found.iterations, way=way_there), tuple(snaps)
 
     def _carried(self, found: EquilibriumResult, refined: Equilibrium) -> EquilibriumResult:
