@@ -99,6 +99,7 @@ ORDER = [
     "mechanics.magnetism",
     "mechanics.tendon_terms",
     "mechanics.tendon_friction",
+    "mechanics.tendon_chains",
     "mechanics.tendon_shares",
     "mechanics.tubes",
     "mechanics.resistance",

@@ -19,7 +19,7 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import RotationFreedom
-from ..mechanics.tendon_friction import settle
+from ..mechanics.tendon_chains import settle
 from .projecting import closed
 
 __all__ = ["shaped"]
