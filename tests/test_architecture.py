@@ -100,6 +100,7 @@ ORDER = [
     "mechanics.magnetism",
     "mechanics.tendon_terms",
     "mechanics.tendon_friction",
+    "mechanics.tendon_chains",
     "mechanics.tendon_shares",
     "mechanics.tubes",
     "mechanics.tube_fields",

@@ -19,7 +19,7 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.fields import rotations_along, strained_like
 from ..mechanics.model import Model
 from ..mechanics.relaxation import relax
-from ..mechanics.tendon_friction import settle
+from ..mechanics.tendon_chains import settle
 from .stages import StageEquations
 
 __all__ = ["at_rest", "equilibrium_before", "moving", "posed", "velocities"]

@@ -20,7 +20,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import RotationFreedom
 from ..mechanics.segments import elongation_of
-from ..mechanics.tendon_friction import settle
+from ..mechanics.tendon_chains import settle
 from .projecting import closed
 
 __all__ = ["shaped", "stretched"]

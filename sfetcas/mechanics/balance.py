@@ -19,7 +19,7 @@ from .connections import connections_of
 from .equations import Equations, State
 from .loading import Loading
 from .segments import elongation_of
-from .tendon_friction import part_of
+from .tendon_chains import part_of
 from .terms import answers_of
 
 __all__ = ["Balance", "SpringState", "three"]

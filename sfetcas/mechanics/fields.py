@@ -35,7 +35,7 @@ from .segments import pulled_place
 from .singles import fibre_strain
 from .stations import Stations
 from .stretch_laws import least_tangent, strain_by_force, stretch_law_of
-from .tendon_friction import is_let_out, settle, turned_since
+from .tendon_chains import is_let_out, settle, turned_since
 from .tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
 from .terms import answers_of, energies_of
 from .tube_fields import fields_of_tube, places_along

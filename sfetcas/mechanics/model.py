@@ -40,7 +40,7 @@ from .rotating_frame import RotatingFrame, with_rotating_frame
 from .rotations import RotationFreedom, Rotations, number_rotations
 from .segments import Segments, cut_members
 from .stretch_laws import stretch_laws_in
-from .tendon_friction import rubbing_in
+from .tendon_chains import rubbing_in
 from .tendon_terms import tendons_in
 from .terms import ALWAYS, Group, One, grouped
 from .tubes import tubes_in

@@ -30,7 +30,7 @@ from ..mechanics.reactions import Reactions
 from ..mechanics.singles import fibre_strain, spin_of, turned_vector
 from ..mechanics.stationarity import Stationarity
 from ..mechanics.stations import Stations
-from ..mechanics.tendon_friction import part_of
+from ..mechanics.tendon_chains import part_of
 from ..mechanics.tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
 from ..mechanics.terms import answers_of
 from ..solvers.program import Program
