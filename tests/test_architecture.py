@@ -207,6 +207,7 @@ ORDER = [
     "paths.contact_curve",
     "paths.contact_trace",
     "paths.contact_path",
+    "paths.memory_path",
     "paths.paths",
     "parametric",
     "parametric.results",

@@ -24,7 +24,7 @@ from ..description.scene import Scene
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index, numbers
 from ..mathematics.forms import Form
-from ..mathematics.hysteresis import energies, updated
+from ..mathematics.hysteresis import energies, lasting, updated
 from ..mathematics.potentials import derivatives_of, deviation
 from .elements import Element, element_by_name
 from .parts import Parts
@@ -120,13 +120,16 @@ class AlongElement(Term):
         symbols = [ca.SX.sym(name, *size) for name, size in (sizes | {"load": (0, 1), "lam": (0, 1)}).items()]
         bent = self._element.changes([ca.vertsplit(symbols[0][:, i]) for i in range(self.nodes)])
         points = ca.horzsplit(ca.reshape(symbols[2], self.width, self.nodes))
-        variables, spent = [], ca.SX(0)
-        for change, point in zip(bent, points, strict=True):
+        variables, spent, turned = [], ca.SX(0), []
+        for change, point, share in zip(bent, points, self._element.weights, strict=True):
             x, own = self.bending(change, point), point[self.width - self.form.size :]
             variables.append(updated(self.form, x, own))
             spent += point[0] * energies(self.form, x, own)[1]
-        results = [ca.densify(part) for part in (ca.vertcat(*variables), spent)]
-        return ca.Function(f"remembered_{name_of(self)}", symbols, results, [*ARGUMENTS], ["z", "spent"], {"cse": True})
+            # The axes have the length of one over that of the element and the unit of curvature.
+            turned.append(share / ca.norm_2(point[1:4] if self.space else point[1]) * lasting(self.form, x, own))
+        results = [ca.densify(part) for part in (ca.vertcat(*variables), spent, ca.vertcat(*turned))]
+        names = ["z", "spent", "turned"]
+        return ca.Function(f"remembered_{name_of(self)}", symbols, results, [*ARGUMENTS], names, {"cse": True})
 
     def _stored_at(self, bent: ca.SX, point: ca.SX) -> ca.SX:
         own = point[self.width - self.form.size :]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -70,17 +70,33 @@ class Remembering:
 
     def after(self, q: Array, before: Array) -> Array:
         """The vector after a step to rotations q, from that before it."""
-        variables, spent = [], []
+        found = self._found(q, before)
+        lost = before[self.size :] + np.concatenate([np.zeros(0), *(each[1].ravel() for each in found)])
+        return np.concatenate([np.zeros(0), *(each[0].T.ravel() for each in found), lost])
+
+    def missed(self, way: Sequence[Array]) -> float:
+        """What one step to the last of several rotations q leaves out of what the way through all of them bends for
+        good, summed along the members, rad.
+        """
+        *between, last = way
+        there = self.begun
+        for q in between:
+            there = self.after(q, there)
+        pairs = zip(self._found(last, self.begun), self._found(last, there), strict=True)
+        apart = (np.linalg.norm((one[2] - other[2]).T.reshape(-1, 3), axis=1).sum() for one, other in pairs)
+        return float(sum(apart))
+
+    def _found(self, q: Array, before: Array) -> list[tuple[Array, ...]]:
+        """Results of :meth:`.Term.remembered`, of each group: columns are its elements."""
+        results = []
         for (_, group, part), function, shape in zip(self.parts(), self._functions, self._shapes, strict=True):
             n = shape[0]
             data = group.data.copy()
             data[:, group.kind.memory_columns] = before[part].reshape(shape)
             turned = q[group.turns].reshape(n * group.turns.shape[1], -1).T
             found = function(turned, ca.DM(self.model.element.axes, 0), data.T, ca.DM(0, n), ca.DM(0, n))
-            variables.append(np.array(found[0]).T.ravel())
-            spent.append(np.array(found[1]).ravel())
-        lost = before[self.size :] + np.concatenate([np.zeros(0), *spent])
-        return np.concatenate([np.zeros(0), *variables, lost])
+            results.append(tuple(np.array(each) for each in found))
+        return results
 
     def mesh(self, vector: Array) -> Mesh:
         """The mesh of the model with what a vector remembers."""

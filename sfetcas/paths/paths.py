@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import tolerances
 from ..description.records import enumerated
+from ..description.remembering import refuse_memory
 from ..description.scene import Scene
 from ..equilibria.settings import Settings, settings_with
 from ..equilibria.solution import Equilibrium, equilibrium
@@ -35,6 +36,7 @@ from ..solvers.redundancy import with_sharing
 from ..solvers.residuals import relative_residual
 from ..solvers.tracing import Traced, full_shape, passes, switched, trace, without
 from .contact_path import MARGIN, STEADY, follow_in_contact
+from .memory_path import HILL, MISSING, chosen_of, left_along, refined_by_fronts, sampled_again, steps_of
 from .path import NO_POTENTIAL, Branch, Path, PathPoint, ending
 from .vibrations import shaken, with_modes
 
@@ -60,6 +62,9 @@ MOST_ELEMENTS = 3000
 
 SAMPLES = 8
 """Points of a stretch that are compared between two meshes, beside those that were asked for."""
+
+WATCHED = 30
+"""Points of a stretch at which fronts between elastic and inelastic parts are looked at, where laws have memory."""
 
 EVALUATIONS = 500.0
 """About as often the equations are evaluated along a path."""
@@ -113,10 +118,12 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
     Raises
     ------
     SceneError
-        There is no such bifurcation, side or shape.
+        There is no such bifurcation, side or shape, or the law of a section has memory.
     SolveError
         No branch was found there.
     """
+    if isinstance(path, Path):
+        refuse_memory(path.scene, "no branch of a path is followed, accepted: laws without memory")
     if side not in (1, -1):
         raise SceneError(f"side: found {side}, accepted: 1 or -1")
     curve, event = _bifurcation_of(path, bifurcation, shape)
@@ -162,8 +169,8 @@ def _bifurcation_of(path: Path, bifurcation: int, shape: int) -> tuple[Curve, Ev
         raise SceneError("bifurcation: the path has none, accepted: a path with bifurcations")
     if not 1 <= bifurcation <= count:
         raise SceneError(f"bifurcation: found {bifurcation}, accepted: 1 to {count}, those of the path")
-    curve = Curve(path.prepared, path.unit)
     number = [i for i, point in enumerate(path.points) if point.kind == "bifurcation"][bifurcation - 1]
+    curve = Curve(path.points[number].prepared or path.prepared, path.unit)
     event = _event_at(curve, path, number)
     if not 1 <= shape <= event.multiplicity:
         raise SceneError(f"shape: found {shape}, accepted: 1 to {event.multiplicity}, those that vanish there")
@@ -173,8 +180,11 @@ def _bifurcation_of(path: Path, bifurcation: int, shape: int) -> tuple[Curve, Ev
 def _event_at(curve: Curve, path: Path, number: int) -> Event:
     """The bifurcation at a point of a path, its tangent taken from both sides."""
     points, along = path.points[number - 1 : number + 2], Tangent(np.zeros(curve.equations.total), 1.0)
-    before, at = (curve.standing(point.state, point.factor, along) for point in points[:2])
-    after = curve.standing(points[2].state, points[2].factor, before.tangent)
+    before, at, after = (
+        curve.on(point.prepared or path.prepared).standing(point.state, point.factor, along) for point in points
+    )
+    if curve.inner(before.tangent, after.tangent) < 0.0:
+        after = replace(after, tangent=Tangent(-after.tangent.z, -after.tangent.factor))
     mean = Tangent(before.tangent.z + after.tangent.z, before.tangent.factor + after.tangent.factor)
     return Event("bifurcation", replace(at, tangent=curve.normed(mean)), max(1, at.inertia.zero))
 
@@ -232,6 +242,7 @@ class PathTracing:
         self.model: Model | None = None
         knots = {t for h in scene.histories.values() for t in h.knots if self.span[0] < t < self.span[1]}
         self.knots = tuple(sorted(knots))
+        self.points = steps_of(scene.analysis) if scene.remembers else scene.analysis.points
 
     # -- meshes ---------------------------------------------------------------------------------
 
@@ -241,11 +252,12 @@ class PathTracing:
         mesh, last = self._first_mesh(), np.inf
         coarse = self._level(mesh)
         if self.fixed == set(self.scene.members):
-            errors = self._errors(coarse, self._level(self._halved(mesh)))
+            errors = self._errors(coarse, self._level(self._halved(mesh)), whose=coarse)
             return self._answer(coarse, errors, begin)
         # The error falls by 4^p a halving; less is taken for granted.
-        gain, stalled = max(1.0, 4.0**mesh.order / MARGIN), 0
+        gain, stalled = 1.0 if self.scene.remembers else max(1.0, 4.0**mesh.order / MARGIN), 0
         for count in range(LEVELS):
+            coarse = self._with_fronts(coarse)
             fine = self._level(self._halved(coarse.curve.model.mesh))
             errors = {key: error / gain for key, error in self._errors(coarse, fine).items()}
             largest = max(errors.values(), default=0.0)
@@ -256,6 +268,21 @@ class PathTracing:
             coarse, last = self._next(fine, gain * largest, gain), largest
         fine.notes += _disagreement(coarse, fine) if not np.isfinite(largest) else ()
         return self._answer(fine, errors, begin)
+
+    def _with_fronts(self, level: _Level) -> _Level:
+        """The level on a mesh on which fronts leave little, if it is not that already."""
+        while self.scene.remembers and 2 * level.curve.model.mesh.elements <= MOST_ELEMENTS:
+            points = [point for part in level.stretches for point in self._watched(level.curve, part)]
+            mesh = refined_by_fronts(level.curve, points, self.accuracy, self.fixed)
+            if mesh is None:
+                break
+            level = self._level(mesh)
+        return level
+
+    @staticmethod
+    def _watched(curve: Curve, part: _Stretch) -> list[Standing]:
+        """Points at which fronts are looked at: limit points, crossings and samples."""
+        return [*part.of_kind("limit"), *part.crossings, *chosen_of(curve, part.traced, 0.0, WATCHED)]
 
     def _next(self, fine: _Level, error: float, gain: float) -> _Level:
         """The next level to compare with its half: the fine one, or one that is finer by as much as the error asks.
@@ -301,7 +328,7 @@ class PathTracing:
 
     def _level(self, mesh: Mesh) -> _Level:
         curve, start, notes = begin_path(self._prepared(mesh), self.span)
-        main = _Stretch(trace(curve, start, self.span, self.analysis.points, self.knots))
+        main = _Stretch(trace(curve, start, self.span, self.points, self.knots, MISSING * self.accuracy))
         way = max(abs(point.factor - start.factor) for point in main.traced.points)
         if main.traced.end == "bent" and way < LEAST_WAY * self._widest:
             raise SolveError(Status.BENT, main.traced.message, start.state)
@@ -356,8 +383,13 @@ class PathTracing:
 
     # -- errors ---------------------------------------------------------------------------------
 
-    def _errors(self, coarse: _Level, fine: _Level) -> dict[tuple[int, str, int], float]:
-        """Differences between two meshes, by stretch, kind and number; infinite where they do not correspond."""
+    def _errors(
+        self, coarse: _Level, fine: _Level, *, whose: _Level | None = None
+    ) -> dict[tuple[int, str, int], float]:
+        """Differences between two meshes, by stretch, kind and number; infinite where they do not correspond.
+
+        Where laws have memory also what fronts, and steps, leave on one of the two, the fine one by default.
+        """
         errors: dict[tuple[int, str, int], float] = {}
         if len(coarse.stretches) != len(fine.stretches):
             errors[0, "branches", 0] = np.inf
@@ -369,7 +401,17 @@ class PathTracing:
                 for j, (one, other) in enumerate(zip(ours, theirs, strict=False)):
                     factor = abs(one.factor - other.factor) / max(abs(other.factor), tolerances.UNIT * self._widest)
                     errors[i, kind, j] = max(largest_difference(one.fields, other.fields), factor)
-            errors[i, "samples", 0] = self._sampled(coarse, a.traced, fine)
+            if not self.scene.remembers:
+                errors[i, "samples", 0] = self._sampled(coarse, a.traced, fine)
+                continue
+            chosen = chosen_of(coarse.curve, a.traced, STEADY, SAMPLES)
+            errors[i, "samples", 0] = sampled_again(chosen, a.traced, fine.curve, b.traced)
+            level, part = (coarse, a) if whose is coarse else (fine, b)
+            left = left_along(level.curve, self._watched(level.curve, part))
+            errors[i, "fronts", 0], errors[i, "missed", 0] = left(np.inf), part.traced.missed
+            for kind in ("limit", "bifurcation", "step"):
+                for j, point in enumerate(part.crossings if kind == "step" else part.of_kind(kind)):
+                    errors[i, kind, j] = max(errors.get((i, kind, j), 0.0), left(point.arc))
         return errors
 
     @property
@@ -378,17 +420,13 @@ class PathTracing:
 
     def _sampled(self, coarse: _Level, traced: Traced, fine: _Level) -> float:
         """Largest difference of points of a coarse stretch when they are corrected on the fine mesh."""
-        curve = coarse.curve
-        steady = [p for p in traced.points if abs(p.tangent.factor) >= STEADY * curve.unit and not p.inertia.zero]
-        chosen = np.unique(np.linspace(0, len(steady) - 1, SAMPLES).round().astype(int)).tolist() if steady else []
-        largest = 0.0
-        for i in chosen:
-            state = transferred(curve.model, steady[i].state, fine.curve.model)
-            flat = Tangent(np.zeros(fine.curve.equations.total), steady[i].tangent.factor)
-            here = replace(steady[i], state=state, tangent=flat)
-            found = fine.curve.at_factor(here, steady[i].factor)
+        curve, largest = coarse.curve, 0.0
+        for point in chosen_of(curve, traced, STEADY, SAMPLES):
+            state = transferred(curve.model, point.state, fine.curve.model)
+            flat = Tangent(np.zeros(fine.curve.equations.total), point.tangent.factor)
+            found = fine.curve.at_factor(replace(point, state=state, tangent=flat), point.factor)
             if found is not None:
-                largest = max(largest, largest_difference(steady[i].fields, found.fields))
+                largest = max(largest, largest_difference(point.fields, found.fields))
         return largest
 
     # -- answers --------------------------------------------------------------------------------
@@ -414,16 +452,20 @@ class PathTracing:
             unit=curve.unit,
             error_estimate=largest if np.isfinite(largest) else None,
             last=last,
-            notes=(*level.notes, *_beyond_laws(level), *(() if curve.model.conservative else (NO_POTENTIAL,))),
+            notes=(*level.notes, *_beyond_laws(level), *self._means(curve)),
             seconds=self.seconds,
         )
+
+    def _means(self, curve: Curve) -> tuple[str, ...]:
+        """What limit points and bifurcations mean, where that is not what they usually do."""
+        return (*(() if curve.model.conservative else (NO_POTENTIAL,)), *((HILL,) if self.scene.remembers else ()))
 
     def answered(self, curve: Curve, stretch: _Stretch, errors: dict[tuple[str, int], float]) -> Branch:
         """A traced branch as a :class:`Branch`, with the estimated errors of its points."""
         traced = stretch.traced
         kinds = {id(event.standing): event for event in traced.events}
         energy = curve.model.conservative
-        points = tuple(_point(p, kinds.get(id(p)), energy) for p in traced.points)
+        points = tuple(_point(p, kinds.get(id(p)), energy, curve) for p in traced.points)
 
         def entries(kind: str, standings: list[Standing], notes: list[tuple[str, ...]]) -> tuple[Equilibrium, ...]:
             numbered = zip(standings, notes, strict=True)
@@ -475,11 +517,13 @@ def _beside(near: tuple[float, ...]) -> tuple[str, ...]:
     )
 
 
-def _point(standing: Standing, event: Event | None, has_energy: bool) -> PathPoint:
+def _point(standing: Standing, event: Event | None, has_energy: bool, curve: Curve) -> PathPoint:
     negative, zero = (standing.inertia.negative, standing.inertia.zero) if has_energy else (0, 0)
     stable: bool | str = (False if negative else "neutral" if zero else True) if has_energy else "not defined"
     kind = "" if event is None else {"limit": "limit point"}.get(event.kind, event.kind)
-    return PathPoint(float(standing.factor), standing.state, standing.loading, negative, stable, standing.arc, kind)
+    own = standing.prepared if curve.remembers else None
+    place = standing.state, standing.loading
+    return PathPoint(float(standing.factor), *place, negative, stable, standing.arc, kind, own)
 
 
 def _said(event: Event, has_energy: bool) -> tuple[str, ...]:
