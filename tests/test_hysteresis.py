@@ -312,7 +312,10 @@ def test_motion(law):
     ("changes", "message"),
     [
         ({"analysis": steps(1, 0, 1)}, "analysis.steps: found 1 twice"),
-        ({"analysis.type": "modes", "sections.s.rhoA": 1.0}, "analysis.type: found 'modes', accepted: 'static', 'path' or 'dynamic'"),
+        (
+            {"analysis.type": "modes", "sections.s.rhoA": 1.0},
+            "analysis.type: found 'modes', accepted: 'static', 'path' or 'dynamic'",
+        ),
         ({"analysis.equilibria": "all"}, "analysis.equilibria: found 'all', accepted: 'one' with the law"),
         ({"sections.s.EA": 1e4}, "sections.s.law: found one with a section that stretches"),
         ({"rotating": [0, 0, 1], "sections.s.rhoA": 1.0}, "rotating: found rotating axes"),

@@ -391,9 +391,9 @@ class Curve:
 
         Between the two the rotations are cubic in the arc length, as both points and tangents say.
         """
-        memory, n = Remembering(self.model), self._rotation_unknowns
-        if not memory.size:
+        if not self.remembers:
             return 0.0
+        memory, n = Remembering(self.model), self._rotation_unknowns
         arc, step = b.arc - a.arc, np.zeros(self.equations.total)
         apart = turned_between(self.equations, b.state, a.state, near=True)
         way = []

@@ -87,10 +87,9 @@ class Prepared:
 
     def remembering(self, q: Array) -> Prepared:
         """The same for the step after that to rotations q; itself where no member remembers anything."""
-        memory = Remembering(self.model)
-        if not memory.size:
+        if not self.model.scene.remembers:
             return self
-        found = copy.copy(self)
+        memory, found = Remembering(self.model), copy.copy(self)
         found.model = memory.model_with(memory.after(q, memory.begun))
         # What is made of the equations is made anew; what is known of the undeformed structure stays.
         for made in ("_test", "_tangent", "_problem", "_globalised", "_kept__solvers"):
