@@ -216,6 +216,7 @@ ORDER = [
     "paths.contact_trace",
     "paths.contact_path",
     "paths.switching",
+    "paths.memory_path",
     "paths.paths",
     "parametric",
     "parametric.results",

@@ -11,8 +11,8 @@ from ..errors import SceneError
 
 __all__ = ["check_memory", "refuse_memory", "remembering_section"]
 
-TYPES = ("static", "dynamic")
-TYPES_IN_WORDS = " or ".join(map(repr, TYPES))
+TYPES = ("static", "path", "dynamic")
+TYPES_IN_WORDS = ", ".join(map(repr, TYPES[:-1])) + f" or {TYPES[-1]!r}"
 """Types of the analysis whose steps come one after the other."""
 
 TURNS = 1e-6
@@ -80,6 +80,8 @@ def check_memory(scene: Any) -> None:
             raise SceneError(message, ("tendons", name))
     if analysis.type == "dynamic":
         _check_motion(analysis, law)
+    elif analysis.type == "path":
+        _check_path(scene, law)
     else:
         _check_steps(scene, law)
 
@@ -92,6 +94,19 @@ def _check_motion(analysis: Any, law: str) -> None:
     if analysis.initial != "undeformed":
         message = f"found {analysis.initial!r}, accepted: 'undeformed' with the law {law!r}, which has memory"
         raise SceneError(message, ("analysis", "initial"))
+
+
+def _check_path(scene: Any, law: str) -> None:
+    analysis = scene.analysis
+    if any(m.remembers(scene.sections) and m.stretches(scene.sections) for m in scene.members.values()):
+        message = f"found 'path' with the law {law!r}, which has memory, of a section that stretches or shears"
+        raise SceneError(f"{message}, accepted: 'static' or 'dynamic'", ("analysis", "type"))
+    if analysis.branches:
+        message = f"found {analysis.branches}, accepted: 0 with the law {law!r}, which has memory"
+        raise SceneError(f"{message}: a path goes on from what led to it", ("analysis", "branches"))
+    if analysis.count_of_modes:
+        message = f"found {analysis.count_of_modes}, accepted: none on a path with the law {law!r}, which has memory"
+        raise SceneError(message, ("analysis", "modes"))
 
 
 def _check_steps(scene: Any, law: str) -> None:

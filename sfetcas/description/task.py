@@ -148,7 +148,7 @@ class Analysis(Record):
         Of a path, needed there: load factors between which it is followed, from 0 upwards, or downwards where
         the range ends at 0.
     points : whole number
-        Of a path: it ends after so many points.
+        Of a path: it ends after so many points; by default after 1000 instead where laws have memory.
     branches : whole number
         Of a path: from so many of the first bifurcations the branches are followed too, to both sides, each for
         ``points`` points.  Their answers stand after those of the path, in the order of the bifurcations and of the

@@ -9,7 +9,7 @@ any of the steps is not smooth, and the error of each is estimated from the diff
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +29,7 @@ from .refinement import DRIFT, LEVELS, MOST_ELEMENTS, STALLS, Refinement
 from .solution import Equilibrium
 from .ways import NO_ENERGY, Ways
 
-__all__ = ["MemorySteps"]
+__all__ = ["MemorySteps", "left_by_fronts", "worst_fronts"]
 
 NOT_FOLLOWED = (
     "the loads could not be followed from the step before; this is a minimum near it, of the energy with what members "
@@ -46,12 +46,13 @@ SHARP, MOST = 0.5, 0.1
 are halved with it."""
 
 
-def _fronts(found: Solved) -> Array:
+def left_by_fronts(found: Solved, across: Callable[[Array], Array] | None = None) -> Array:
     """What fronts within elements leave of rotations anywhere, (elements,), rad; of positions over the size, at most.
 
     Each element bends by its own error more, as by two opposite moments at its ends, and the structure answers with its
     present stiffness: near collapse by many times the error of the element.  Elements that no front crosses are smooth,
-    and the comparison of meshes judges them.
+    and the comparison of meshes judges them.  ``across`` takes from the answers of the structure (total, n) what they
+    have along a path, on which the factor gives way.
     """
     model, equations = found.model, found.equations
     errors, present, mixed = front_errors(found.fields)
@@ -82,9 +83,16 @@ def _fronts(found: Solved) -> Array:
         np.add.at(right, (rows[used], np.broadcast_to(columns, rows.shape)[used]), given[used])
     primal = tolerances.PROXIMAL * found.prepared.weight
     equations.solver.factor(equations.regularised(found.point.entries, primal, tolerances.DUAL))
-    turned = np.abs(equations.solver.solve(right)[: equations.rotation_unknowns]).max(axis=0, initial=0.0)
+    moved = equations.solver.solve(right)
+    moved = moved if across is None else across(moved)
+    turned = np.abs(moved[: equations.rotation_unknowns]).max(axis=0, initial=0.0)
     answered[chosen] = np.maximum(answered[chosen], turned)
     return answered + longer
+
+
+def worst_fronts(fronts: Array, accuracy: float) -> Array:
+    """Which elements (elements,) are to be halved, as their fronts leave most: none where all together leave little."""
+    return np.asarray((fronts > MOST * fronts.max(initial=0.0)) & (fronts.sum() > SHARP * accuracy))
 
 
 SMALL = 1e-3
@@ -159,7 +167,7 @@ class MemorySteps:
         each = [self.refinement.marked(one, smooth) for one in now]
         model = now[0].solved.model
         for fronts in self._fronts(now):
-            worst = (fronts > MOST * fronts.max(initial=0.0)) & (fronts.sum() > SHARP * self.meshes.accuracy)
+            worst = worst_fronts(fronts, self.meshes.accuracy)
             each.append({n: worst[model.elements_of(n)] & (n not in self.meshes.fixed) for n in model.members})
         return {name: np.any([marks[name] for marks in each], axis=0) for name in each[0]}
 
@@ -172,8 +180,8 @@ class MemorySteps:
 
     @kept(2)
     def _fronts(self, sequence: Sequence_) -> list[Array]:
-        """As of :func:`_fronts`, of each step."""
-        return [_fronts(one.solved) for one in sequence]
+        """As of :func:`left_by_fronts`, of each step."""
+        return [left_by_fronts(one.solved) for one in sequence]
 
     def _sequence(self, mesh: Mesh, near: Sequence[EquilibriumResult]) -> Sequence_:
         """All steps on a mesh, one after the other; ``near`` are those of a coarser one."""

@@ -27,7 +27,7 @@ from ..description.scene import Scene
 from ..mathematics import quaternion
 from ..mathematics.arrays import TINY, Array, Index, numbers
 from ..mathematics.forms import Form
-from ..mathematics.hysteresis import energies, updated
+from ..mathematics.hysteresis import energies, lasting, updated
 from ..mathematics.potentials import derivatives_of, deviation
 from .elements import Element, element_by_name
 from .parts import Parts
@@ -141,13 +141,17 @@ class AlongElement(Term):
         sizes = {"q": (self.components, self.nodes), "u": (self.axes, self.sizes[1]), "data": (self.sizes[3], 1)}
         symbols = [ca.SX.sym(name, *size) for name, size in (sizes | {"load": (0, 1), "lam": (0, 1)}).items()]
         q, u = ([ca.vertsplit(side) for side in ca.horzsplit(part)] if part.shape[1] else [] for part in symbols[:2])
-        variables, spent = [], ca.SX(0)
-        for bent, strain, point in self._points(q, u, symbols[2]):
+        variables, spent, turned = [], ca.SX(0), []
+        points = zip(self._points(q, u, symbols[2]), self._element.weights, strict=True)
+        for (bent, strain, point), share in points:
             x, own = self.bending(bent, strain, point), point[self.width - self.form.size :]
             variables.append(updated(self.form, x, own))
             spent += point[0] * energies(self.form, x, own)[1]
-        results = [ca.densify(part) for part in (ca.vertcat(*variables), spent)]
-        return ca.Function(f"remembered_{name_of(self)}", symbols, results, [*ARGUMENTS], ["z", "spent"], {"cse": True})
+            # The axes have the length of one over that of the element and the unit of curvature.
+            turned.append(share / ca.norm_2(point[1:4] if self.space else point[1]) * lasting(self.form, x, own)[:3])
+        results = [ca.densify(part) for part in (ca.vertcat(*variables), spent, ca.vertcat(*turned))]
+        names = ["z", "spent", "turned"]
+        return ca.Function(f"remembered_{name_of(self)}", symbols, results, [*ARGUMENTS], names, {"cse": True})
 
     def _stored_at(self, bent: ca.SX, strain: ca.SX, point: ca.SX) -> ca.SX:
         own = point[self.width - self.form.size :]

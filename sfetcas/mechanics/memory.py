@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -70,7 +70,26 @@ class Remembering:
 
     def after(self, q: Array, y: Array, before: Array) -> Array:
         """The vector after a step to rotations q and displacement unknowns y, from that before it."""
-        variables, spent, known = [], [], np.append(y, 0.0)
+        found = self._found(q, y, before)
+        lost = before[self.size :] + np.concatenate([np.zeros(0), *(each[1].ravel() for each in found)])
+        return np.concatenate([np.zeros(0), *(each[0].T.ravel() for each in found), lost])
+
+    def missed(self, way: Sequence[tuple[Array, Array]]) -> float:
+        """What one step to the last of several states, rotations q and displacement unknowns y, leaves out.
+
+        It is by how much what the way through all of them bends for good differs, summed along the members, rad.
+        """
+        *between, last = way
+        there = self.begun
+        for state in between:
+            there = self.after(*state, there)
+        pairs = zip(self._found(*last, self.begun), self._found(*last, there), strict=True)
+        apart = (np.linalg.norm((one[2] - other[2]).T.reshape(-1, 3), axis=1).sum() for one, other in pairs)
+        return float(sum(apart))
+
+    def _found(self, q: Array, y: Array, before: Array) -> list[tuple[Array, ...]]:
+        """Results of :meth:`.Term.remembered`, of each group: columns are its elements."""
+        results, known = [], np.append(y, 0.0)
         for (_, group, part), function, shape in zip(self.parts(), self._functions, self._shapes, strict=True):
             n = shape[0]
             data = group.data.copy()
@@ -79,10 +98,8 @@ class Remembering:
             # Places of strains are all unknown.
             strains = known[self.model.positions.retained[group.places]].reshape(-1, self.model.element.axes).T
             found = function(turned, strains, data.T, ca.DM(0, n), ca.DM(0, n))
-            variables.append(np.array(found[0]).T.ravel())
-            spent.append(np.array(found[1]).ravel())
-        lost = before[self.size :] + np.concatenate([np.zeros(0), *spent])
-        return np.concatenate([np.zeros(0), *variables, lost])
+            results.append(tuple(np.array(each) for each in found))
+        return results
 
     def mesh(self, vector: Array) -> Mesh:
         """The mesh of the model with what a vector remembers."""

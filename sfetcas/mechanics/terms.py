@@ -239,7 +239,8 @@ class Term(Components, abc.ABC):
 
     def remembered(self) -> ca.Function:
         """``(q, u, data, load, lam) ->`` internal variables of its points, one point after the other, at the end of a
-        step, and what the step has dissipated; of a kind with :attr:`memory`.
+        step, what the step has dissipated, and by how much the element is bent for good about each axis of its section
+        at each point, (3 points,), rad; of a kind with :attr:`memory`.
         """
         raise NotImplementedError
 

@@ -111,8 +111,9 @@ class PathPoint:
         ``""``, ``"limit point"``, ``"bifurcation"`` or ``"transition"``, after which comes the same point again with
         what is taut or at a stop from there on.
     prepared : Prepared, optional
-        Its own discretisation where that differs from the one of the path: in contact elements end at the contacts, and
-        tendons that are slack and stops that are reached make other equations.
+        Its own model where that differs from the one of the path: in contact elements end at the contacts, tendons that
+        are slack and stops that are reached make other equations, and with memory it knows what the points before have
+        left.
     omega, growth : ndarray (modes,), optional
         Where modes are asked for: angular frequencies, rad/s, and growth rates, 1/s, of the lowest motions.  Those that
         leave the equilibrium without oscillating come first, with frequency zero; a negative rate means decay.
@@ -345,10 +346,13 @@ class Path:
                 key = "quaternion" if model.space else "angle"
                 turned = [here.rotation(name) for here in fields]
                 nodes[name][key] = [t.tolist() if model.space else float(t[0]) for t in turned if t is not None]
+        # What points have beside their states.
         moving: dict[str, Any] = {}
         for key in ("omega", "growth"):
             courses = [getattr(point, key) for point in points]
             moving |= {key: [course.tolist() for course in courses]} if self.massive is not None else {}
+        if self.scene.remembers:
+            moving["dissipated"] = [sum(here.dissipated.values()) for here in fields]
         return {
             "factor": branch.factors.tolist(),
             "nodes": nodes,

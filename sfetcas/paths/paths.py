@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import tolerances
 from ..description.records import enumerated
+from ..description.remembering import refuse_memory
 from ..description.scene import Scene
 from ..equilibria.settings import Settings, settings_with
 from ..equilibria.solution import Equilibrium, equilibrium
@@ -36,6 +37,7 @@ from ..solvers.redundancy import with_sharing
 from ..solvers.residuals import relative_residual
 from ..solvers.tracing import full_shape, passes, switched
 from .contact_path import MARGIN, STEADY, follow_in_contact
+from .memory_path import HILL, MISSING, chosen_of, left_along, refined_by_fronts, sampled_again, steps_of
 from .path import NO_POTENTIAL, Branch, Path, PathPoint, TransitionPoint, ending
 from .switching import Choices, Followed, Transition
 from .vibrations import shaken, with_modes
@@ -62,6 +64,9 @@ MOST_ELEMENTS = 3000
 
 SAMPLES = 8
 """Points of a stretch that are compared between two meshes, beside those that were asked for."""
+
+WATCHED = 30
+"""Points of a stretch at which fronts between elastic and inelastic parts are looked at, where laws have memory."""
 
 EVALUATIONS = 500.0
 """About as often the equations are evaluated along a path."""
@@ -115,10 +120,12 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
     Raises
     ------
     SceneError
-        There is no such bifurcation, side or shape.
+        There is no such bifurcation, side or shape, or the law of a section has memory.
     SolveError
         No branch was found there.
     """
+    if isinstance(path, Path):
+        refuse_memory(path.scene, "no branch of a path is followed, accepted: laws without memory")
     if side not in (1, -1):
         raise SceneError(f"side: found {side}, accepted: 1 or -1")
     curve, event = _bifurcation_of(path, bifurcation, shape)
@@ -175,8 +182,11 @@ def _bifurcation_of(path: Path, bifurcation: int, shape: int) -> tuple[Curve, Ev
 def _event_at(curve: Curve, path: Path, number: int) -> Event:
     """The bifurcation at a point of a path, its tangent taken from both sides."""
     points, along = path.points[number - 1 : number + 2], Tangent(np.zeros(curve.equations.total), 1.0)
-    before, at = (curve.standing(point.state, point.factor, along) for point in points[:2])
-    after = curve.standing(points[2].state, points[2].factor, before.tangent)
+    before, at, after = (
+        curve.on(point.prepared or path.prepared).standing(point.state, point.factor, along) for point in points
+    )
+    if curve.inner(before.tangent, after.tangent) < 0.0:
+        after = replace(after, tangent=Tangent(-after.tangent.z, -after.tangent.factor))
     mean = Tangent(before.tangent.z + after.tangent.z, before.tangent.factor + after.tangent.factor)
     return Event("bifurcation", replace(at, tangent=curve.normed(mean)), max(1, at.inertia.zero))
 
@@ -243,6 +253,7 @@ class PathTracing:
         self.stops: Stops = ()
         knots = {t for h in scene.histories.values() for t in h.knots if self.span[0] < t < self.span[1]}
         self.knots = tuple(sorted(knots))
+        self.points = steps_of(scene.analysis) if scene.remembers else scene.analysis.points
 
     # -- meshes ---------------------------------------------------------------------------------
 
@@ -252,11 +263,12 @@ class PathTracing:
         mesh, last = self._first_mesh(), np.inf
         coarse = self._level(mesh)
         if self.fixed == set(self.scene.members):
-            errors = self._errors(coarse, self._level(self._halved(mesh)))
+            errors = self._errors(coarse, self._level(self._halved(mesh)), whose=coarse)
             return self._answer(coarse, errors, begin)
         # The error falls by 4^p a halving; less is taken for granted.
-        gain, stalled = max(1.0, 4.0**mesh.order / MARGIN), 0
+        gain, stalled = 1.0 if self.scene.remembers else max(1.0, 4.0**mesh.order / MARGIN), 0
         for count in range(LEVELS):
+            coarse = self._with_fronts(coarse)
             fine = self._level(self._halved(coarse.curve.model.mesh))
             errors = {key: error / gain for key, error in self._errors(coarse, fine).items()}
             largest = max(errors.values(), default=0.0)
@@ -267,6 +279,21 @@ class PathTracing:
             coarse, last = self._next(fine, gain * largest, gain), largest
         fine.notes += _disagreement(coarse, fine) if not np.isfinite(largest) else ()
         return self._answer(fine, errors, begin)
+
+    def _with_fronts(self, level: _Level) -> _Level:
+        """The level on a mesh on which fronts leave little, if it is not that already."""
+        while self.scene.remembers and 2 * level.curve.model.mesh.elements <= MOST_ELEMENTS:
+            points = [point for part in level.stretches for point in self._watched(level.curve, part)]
+            mesh = refined_by_fronts(level.curve, points, self.accuracy, self.fixed)
+            if mesh is None:
+                break
+            level = self._level(mesh)
+        return level
+
+    @staticmethod
+    def _watched(curve: Curve, part: _Stretch) -> list[Standing]:
+        """Points at which fronts are looked at: limit points, crossings and samples."""
+        return [*part.of_kind("limit"), *part.crossings, *chosen_of(curve, part.traced, 0.0, WATCHED)]
 
     def _next(self, fine: _Level, error: float, gain: float) -> _Level:
         """The next level to compare with its half: the fine one, or one that is finer by as much as the error asks.
@@ -288,7 +315,7 @@ class PathTracing:
             return graded
         choices = self.choices(plain)
         curve, start, _ = choices.begin()
-        met = [point.factor for point in choices.follow(curve, start, self.analysis.points).points]
+        met = [point.factor for point in choices.follow(curve, start, self.points).points]
         return self._mesh((max(1.5 * min(met), self.span[0]), min(1.5 * max(met), self.span[1])))
 
     def _mesh(self, factors: tuple[float, ...]) -> Mesh:
@@ -320,7 +347,7 @@ class PathTracing:
     def _level(self, mesh: Mesh) -> _Level:
         choices = self.choices(mesh)
         curve, start, notes = choices.begin(self.stops)
-        main = _Stretch(choices.follow(curve, start, self.analysis.points))
+        main = _Stretch(choices.follow(curve, start, self.points, MISSING * self.accuracy))
         way = max(abs(point.factor - start.factor) for point in main.traced.points)
         if main.traced.end == "bent" and way < LEAST_WAY * self._widest:
             raise SolveError(Status.BENT, main.traced.message, start.state)
@@ -375,20 +402,38 @@ class PathTracing:
 
     # -- errors ---------------------------------------------------------------------------------
 
-    def _errors(self, coarse: _Level, fine: _Level) -> dict[tuple[int, str, int], float]:
-        """Differences between two meshes, by stretch, kind and number; infinite where they do not correspond."""
+    def _errors(
+        self, coarse: _Level, fine: _Level, *, whose: _Level | None = None
+    ) -> dict[tuple[int, str, int], float]:
+        """Differences between two meshes, by stretch, kind and number; infinite where they do not correspond.
+
+        Where laws have memory also what fronts, and steps, leave on one of the two, the fine one by default.
+        """
         errors: dict[tuple[int, str, int], float] = {}
         if len(coarse.stretches) != len(fine.stretches):
             errors[0, "branches", 0] = np.inf
         for i, (a, b) in enumerate(zip(coarse.stretches, fine.stretches, strict=False)):
             for kind in ("limit", "bifurcation", "transition", "step"):
                 ours, theirs = (s.crossings if kind == "step" else s.of_kind(kind) for s in (a, b))
-                if len(ours) != len(theirs):
+                # Where places begin to yield steps are short: paths of so many points do not end at one place.
+                cut = self.scene.remembers and "points" in (a.traced.end, b.traced.end)
+                if len(ours) != len(theirs) and not cut:
                     errors[i, kind, -1] = np.inf
                 for j, (one, other) in enumerate(zip(ours, theirs, strict=False)):
                     factor = abs(one.factor - other.factor) / max(abs(other.factor), tolerances.UNIT * self._widest)
                     errors[i, kind, j] = max(largest_difference(one.fields, other.fields), factor)
-            errors[i, "samples", 0] = self._sampled(coarse, a.traced, fine)
+            if not self.scene.remembers:
+                errors[i, "samples", 0] = self._sampled(coarse, a.traced, fine)
+                continue
+            chosen = chosen_of(coarse.curve, a.traced, STEADY, SAMPLES)
+            errors[i, "samples", 0] = sampled_again(chosen, a.traced, fine.curve, b.traced)
+            level, part = (coarse, a) if whose is coarse else (fine, b)
+            left = left_along(level.curve, self._watched(level.curve, part))
+            errors[i, "fronts", 0], errors[i, "missed", 0] = left(np.inf), part.traced.missed
+            for kind in ("limit", "bifurcation", "step"):
+                for j, point in enumerate(part.crossings if kind == "step" else part.of_kind(kind)):
+                    if (i, kind, j) in errors:
+                        errors[i, kind, j] = max(errors[i, kind, j], left(point.arc))
         return errors
 
     @property
@@ -397,18 +442,14 @@ class PathTracing:
 
     def _sampled(self, coarse: _Level, traced: Followed, fine: _Level) -> float:
         """Largest difference of points of a coarse stretch when they are corrected on the fine mesh."""
-        unit = coarse.curve.unit
-        steady = [p for p in traced.points if abs(p.tangent.factor) >= STEADY * unit and not p.inertia.zero]
-        chosen = np.unique(np.linspace(0, len(steady) - 1, SAMPLES).round().astype(int)).tolist() if steady else []
         largest = 0.0
-        for i in chosen:
-            curve = fine.choices.curve(steady[i].model.mesh.stops)
-            state = transferred(steady[i].model, steady[i].state, curve.model)
-            flat = Tangent(np.zeros(curve.equations.total), steady[i].tangent.factor)
-            here = replace(steady[i], state=state, tangent=flat)
-            found = curve.at_factor(here, steady[i].factor)
+        for point in chosen_of(coarse.curve, traced, STEADY, SAMPLES):
+            curve = fine.choices.curve(point.model.mesh.stops)
+            state = transferred(point.model, point.state, curve.model)
+            flat = Tangent(np.zeros(curve.equations.total), point.tangent.factor)
+            found = curve.at_factor(replace(point, state=state, tangent=flat), point.factor)
             if found is not None:
-                largest = max(largest, largest_difference(steady[i].fields, found.fields))
+                largest = max(largest, largest_difference(point.fields, found.fields))
         return largest
 
     # -- answers --------------------------------------------------------------------------------
@@ -434,9 +475,13 @@ class PathTracing:
             unit=curve.unit,
             error_estimate=largest if np.isfinite(largest) else None,
             last=last,
-            notes=(*level.notes, *_beyond_laws(level), *(() if curve.model.conservative else (NO_POTENTIAL,))),
+            notes=(*level.notes, *_beyond_laws(level), *self._means(curve)),
             seconds=self.seconds,
         )
+
+    def _means(self, curve: Curve) -> tuple[str, ...]:
+        """What limit points and bifurcations mean, where that is not what they usually do."""
+        return (*(() if curve.model.conservative else (NO_POTENTIAL,)), *((HILL,) if self.scene.remembers else ()))
 
     def answered(self, prepared: Prepared, stretch: _Stretch, errors: dict[tuple[str, int], float]) -> Branch:
         """A traced branch as a :class:`Branch`, with the estimated errors of its points, on a path of ``prepared``."""

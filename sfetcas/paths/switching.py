@@ -114,6 +114,11 @@ class Followed:
         return tuple(factor for part in self.parts for factor in part.traced.near)
 
     @property
+    def missed(self) -> float:
+        """As of :class:`~sfetcas.solvers.tracing.Traced`, of all parts."""
+        return sum(part.traced.missed for part in self.parts)
+
+    @property
     def end(self) -> str:
         """As of :class:`~sfetcas.solvers.tracing.Traced`."""
         return self.parts[-1].traced.end
@@ -211,13 +216,13 @@ class Choices:
 
     # -- along ----------------------------------------------------------------------------------
 
-    def follow(self, curve: Curve, start: Standing, count: int) -> Followed:
-        """A path from a point on, over all changes of the choice."""
+    def follow(self, curve: Curve, start: Standing, count: int, missing: float = np.inf) -> Followed:
+        """A path from a point on, over all changes of the choice; ``missing`` as of :func:`.trace`."""
         found, tried = Followed(), set[Stops]()
         watch = self._watched if self.constraints else None
         while True:
             left = max(1, count - found.count) if found.parts else count
-            traced = trace(curve, start, self.span, left, self.knots, watch)
+            traced = trace(curve, start, self.span, left, self.knots, watch, missing)
             found.parts.append(Part(curve, traced))
             if traced.end != "margin":
                 return found

@@ -292,7 +292,8 @@ def _draw_branch(axes: Axes, branch: Branch, values: Array, colour: str, *, upri
 def _smooth(branch: Branch, first: int, last: int, places: Array) -> Array:
     """Places (n, 2) of the points from the ``first`` to the ``last``, with others on cubics over the arc between them.
 
-    In contact, and where strings go slack or stops are reached, a path may have corners: lines are straight.
+    In contact, with memory, and where strings go slack or stops are reached, a path may have corners: lines are
+    straight.
     """
     part = slice(first, last + 1)
     arcs = np.array([point.arc for point in branch.points])

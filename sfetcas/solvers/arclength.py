@@ -20,6 +20,7 @@ from .. import tolerances
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import Point, State
 from ..mechanics.loading import Loading
+from ..mechanics.memory import Remembering
 from .between_states import turned_between
 from .neutral import Neutral
 from .newton import Balance, Limits, correct
@@ -51,6 +52,12 @@ SHORT = 0.01
 
 FIXED_STEP = 1e-3
 """Change of prescribed rotations, rad, in differences of the equations by the factor: of fourth order, so 1e-13."""
+
+STARTS, BEHIND = 60, 10.0
+"""Starts of Newton's method beside a corner of the curve; times farther than ahead a point behind it is looked for."""
+
+PLACES = (1.0 / 3.0, 2.0 / 3.0)
+"""Places within a step at which it is looked for turning points of what members remember."""
 
 HISTORY = 1e-5
 """Step of the differences of loads with histories, share of the unit of the factor: of second order, so 1e-10."""
@@ -135,6 +142,23 @@ class Curve:
         table; empty if none does.
         """
         return standing.fields.too_large() if self._limited else ""
+
+    @property
+    def remembers(self) -> bool:
+        """Whether members remember what has led to a point, so that the curve goes on from each of them anew."""
+        return self.model.scene.remembers
+
+    def on(self, prepared: Prepared) -> Curve:
+        """The curve with what members remember in another model of the same mesh; itself where that is its own."""
+        if prepared is self.prepared:
+            return self
+        there = copy.copy(self)
+        there.prepared, there.equations, there.model = prepared, prepared.equations, prepared.model
+        return there
+
+    def following(self, there: Standing) -> Curve:
+        """The curve on which the path goes on from a point: members remember what has led there."""
+        return self.on(there.prepared.remembering(there.state))
 
     def within(self, piece: tuple[float, float]) -> Curve:
         """A copy of the curve with another ``piece``, the range of factors without a knot of a history."""
@@ -305,11 +329,11 @@ class Curve:
         With a large ``primal_factor`` of the proximal term neutral directions keep their values.  ``sharp`` iterates
         to rounding instead of :data:`PASSING`.
         """
-        system = _Across(
-            self, across, primal_factor if across.neutral is None else max(primal_factor, LARGE_PRIMAL_FACTOR), sharp
-        )
         limits = Limits(iterations=ITERATIONS, short=SHORT, turned=TURN, near=tolerances.BALANCED, returns=False)
-        found = Solved(self.prepared, *correct(system, state, factor=factor, limits=limits))
+        primal_factor = primal_factor if across.neutral is None else max(primal_factor, LARGE_PRIMAL_FACTOR)
+        found = Solved(
+            self.prepared, *correct(_Across(self, across, primal_factor, sharp), state, factor=factor, limits=limits)
+        )
         return self._standing(found, across, arc) if found.converged else None
 
     def at_factor(self, near: Standing, factor: float, most: float = TURN) -> Standing | None:
@@ -327,7 +351,60 @@ class Curve:
             return None
         return self.standing(found.state, factor, near.tangent, arc=near.arc)
 
+    def around(self, now: Standing, length: float) -> Standing | None:
+        """The point at about a small length beyond a corner, shortly behind which a point lies; None if none is found.
+
+        At the corner some places begin to yield and others to unload.  Newton's method may lead to and fro between the
+        two there: it is begun at places around the expected one.  Where the curve turns back sharply, it goes on
+        behind the point that it has come to; what only unloads there is the way back and no answer.
+        """
+        rng, n, memory = np.random.default_rng(0), self._rotation_unknowns, Remembering(self.model)
+        for size in np.geomspace(0.1, 10.0, STARTS):
+            shape = rng.standard_normal(n)
+            for ahead in (length, -BEHIND * length):
+                state, factor = self.predicted(now, ahead)
+                aside = np.zeros(self.equations.total)
+                aside[:n] = size * ahead * shape
+                along = self.inner(Tangent(aside, 0.0), now.tangent)
+                begin = self.equations.moved(state, aside - along * now.tangent.z)
+                factor -= along * now.tangent.factor
+                there = self.corrected(begin, factor, now.tangent, now.arc + abs(ahead), sharp=False)
+                if there is None:
+                    continue
+                after = memory.after(there.state.q, there.state.y, memory.begun)
+                spent = after[memory.size :] - memory.begun[memory.size :]
+                if spent.sum() > 0.0:
+                    return self._leading(now, there)
+        return None
+
+    def _leading(self, a: Standing, b: Standing) -> Standing:
+        """The second of two neighbours with its tangent in the direction that leads away from the first."""
+        way = Tangent(np.zeros(self.equations.total), b.factor - a.factor)
+        way.z[: self._rotation_unknowns] = turned_between(self.equations, b.state, a.state, near=True)
+        if self.inner(way, b.tangent) > 0.0:
+            return b
+        return replace(b, tangent=replace(b.tangent, z=-b.tangent.z, factor=-b.tangent.factor))
+
     # -- between two points ---------------------------------------------------------------------
+
+    def missed(self, a: Standing, b: Standing) -> float:
+        """What one step from a point to the next leaves out of what members remember, see :meth:`.Remembering.missed`.
+
+        Between the two the rotations are cubic in the arc length, as both points and tangents say.
+        """
+        if not self.remembers:
+            return 0.0
+        memory, n = Remembering(self.model), self._rotation_unknowns
+        arc, step = b.arc - a.arc, np.zeros(self.equations.total)
+        apart = turned_between(self.equations, b.state, a.state, near=True)
+        way = list[tuple[Array, Array]]()
+        for s in PLACES:
+            rates = (s - 2.0 * s**2 + s**3) * a.tangent.z[:n] - (s**2 - s**3) * b.tangent.z[:n]
+            step[:n] = (3.0 * s**2 - 2.0 * s**3) * apart + arc * rates
+            there = self.loading(a.factor + s * (b.factor - a.factor))
+            moved = self.with_prescribed(self.equations.moved(a.state, step), there)
+            way.append((moved.q, moved.y))
+        return memory.missed([*way, (b.state.q, b.state.y)])
 
     def between(self, a: Standing, b: Standing) -> Callable[[float], Standing | None]:
         """Points of the curve between two neighbours, by their distance from the first along its tangent.
@@ -358,7 +435,7 @@ class Curve:
 class _Across:
     """The bordered system of an equilibrium with unknown factor, for :func:`~sfetcas.solvers.newton.correct`.
 
-    Its further equation keeps steps orthogonal to a direction.  Motions that are neutral along the curve are updated
+    Its further equation keeps steps orthogonal to a direction.   Motions that are neutral along the curve are updated
     at each step, and no step goes along them.
     """
 

@@ -14,25 +14,25 @@ from ..mechanics.rotations import RotationFreedom
 __all__ = ["free_parts", "turned_between"]
 
 
-def turned_between(equations: Equations, here: State, there: State) -> Array:
+def turned_between(equations: Equations, here: State, there: State, *, near: bool = False) -> Array:
     """Rotations from ``there`` to ``here`` as values of the rotation unknowns, (rotation unknowns,) rad.
 
     Plane angles count turns, except of parts in which no rotation is fixed: a whole turn of such a part is no
-    difference.
+    difference.  States that are ``near`` each other are none apart.
     """
     model = equations.model
-    vectors = _rotation_vectors(model, here, there) if model.space else _angles(model, here, there)
+    vectors = _rotation_vectors(model, here, there) if model.space else here.q - there.q
+    if not model.space and not near:
+        _without_whole_turns(model, vectors)
     between = np.zeros(equations.rotation_unknowns)
     used = equations.number >= 0
     between[equations.number[used]] = vectors[used]
     return between
 
 
-def _angles(model: Model, here: State, there: State) -> Array:
-    angles = here.q - there.q
+def _without_whole_turns(model: Model, angles: Array) -> None:
     for part in free_parts(model):
         angles[part] -= 2.0 * np.pi * np.round(angles[part].mean() / (2.0 * np.pi))
-    return np.asarray(angles)
 
 
 def _rotation_vectors(model: Model, here: State, there: State) -> Array:

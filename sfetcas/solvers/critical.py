@@ -282,7 +282,7 @@ def at_factors(curve: Curve, points: list[Standing], factors: tuple[float, ...])
         low, high = min(a.factor, b.factor), max(a.factor, b.factor)
         here = [f for f in dict.fromkeys(factors) if low < f < high or f == b.factor]
         for factor in sorted(here, reverse=bool(b.factor < a.factor)):
-            standing = b if factor == b.factor else _at_factor(curve, a, b, factor)
+            standing = b if factor == b.factor else _at_factor(curve.on(b.prepared), a, b, factor)
             if standing is not None:
                 met.append(standing)
     return met

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from ..mechanics.equations import Equations, Point, State
 from ..mechanics.expressions import Expressions
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
+from ..mechanics.memory import Remembering
 from ..mechanics.model import Model
 from .constraints import Diagnosis, contradiction, diagnose, free_motions
 from .divergence import TangentTest
@@ -87,6 +89,18 @@ class Prepared:
     def equations(self) -> Equations:
         """The stationarity equations in rotations."""
         return Equations(self.model, kernels=self.kernels, evaluations=self._evaluations)
+
+    def remembering(self, state: State) -> Prepared:
+        """The same for the step after that to a state; itself where no member remembers anything."""
+        if not self.model.scene.remembers:
+            return self
+        memory, found = Remembering(self.model), copy.copy(self)
+        found.model = memory.model_with(memory.after(state.q, state.y, memory.begun))
+        # What is made of the equations is made anew; what is known of the undeformed structure stays.
+        for made in ("_test", "_tangent", "_problem", "_globalised", "_kept__solvers"):
+            found.__dict__.pop(made, None)
+        found.equations = self.equations.remembering(found.model)
+        return found
 
     @functools.cached_property
     def diagnosis(self) -> Diagnosis:

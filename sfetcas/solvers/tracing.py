@@ -38,6 +38,9 @@ SHARE = 30
 FAR = 0.5
 """A point farther from the expected one than this share of the step is not on the same curve."""
 
+CORNER = 50.0
+"""The same where places begin to yield: the tangent of the angle between two tangents, times that of the rotations."""
+
 SHORTEST = 1e-7
 """Shorter steps, rad or shares of the unit, end a curve."""
 
@@ -49,6 +52,12 @@ TOUCH = 3.0 * FINE
 
 FIRST = 0.1
 """Length of the first step, rad or shares of the unit."""
+
+SPREAD = 0.05
+"""Steps may leave out as much of what members remember as if they were longer by this: rates jump at corners."""
+
+BLURRED = 1e-10
+"""What steps leave out of what members remember is rounding up to this, rad."""
 
 MOST_AT_ONCE = 6
 """So many eigenvalues at most change their signs at once: more do so where a mesh is too coarse for what it carries."""
@@ -100,6 +109,8 @@ class Traced:
         Factors at which it comes so near to another curve that a step led there at first.
     crossed : tuple of int
         Where it ends ``margin``: which of the margins are zero there and below beyond it.
+    missed : float
+        What its steps together leave out of what members remember, rad, see :meth:`.Curve.missed`.
     """
 
     points: list[Standing]
@@ -108,6 +119,7 @@ class Traced:
     message: str = ""
     near: tuple[float, ...] = ()
     crossed: tuple[int, ...] = ()
+    missed: float = 0.0
 
 
 def trace(
@@ -117,11 +129,13 @@ def trace(
     count: int,
     knots: tuple[float, ...] = (),
     watch: Callable[[Standing], Array] | None = None,
+    missing: float = np.inf,
 ) -> Traced:
     """Follow a curve from a point until the factor leaves the span, or for so many points.
 
     At the knots of histories the curve has a corner: it is followed from one to the next.  ``watch`` gives the margins
-    of a point (n,), dimensionless: where one of them falls below zero the curve ends.
+    of a point (n,), dimensionless: where one of them falls below zero the curve ends.  Where members have memory each
+    point is one that the next remembers; a step leaves out ``missing`` of that, over its length, at most.
     """
     usual = start.inertia.zero
     start = curve.without_neutral(start) if usual and start.tangent.neutral is None else start
@@ -137,16 +151,36 @@ def trace(
         if here is not curve:
             along = replace(now.tangent, z=np.zeros_like(now.tangent.z))
             now = here.standing(now.state, now.factor, along, arc=now.arc, iterations=now.iterations)
+        if curve.remembers:
+            here = here.following(now)
+            now = _leaving(here, now)
         stride = (span[1] - span[0]) / SHARE
         more = count - len(traced.points) + len(traced.events)
-        part = _Piece(here, ahead[0], stride, more, here.searched + max(SEARCHED, more), [now], watch=watch).traced()
+        budget = here.searched + max(SEARCHED, more)
+        part = _Piece(here, ahead[0], stride, more, budget, [now], watch=watch, missing=missing).traced()
         # A path that touches the end of its range may be singular there, and rounding puts that beyond.
         events = [event for event in part.events if span[0] <= event.standing.factor <= span[1]]
         outside = {id(event.standing) for event in part.events} - {id(event.standing) for event in events}
         points = [point for point in part.points[1:] if id(point) not in outside]
         near = traced.near + part.near
-        traced = Traced(traced.points + points, traced.events + events, part.end, part.message, near, part.crossed)
+        missed = traced.missed + part.missed
+        traced = Traced(
+            traced.points + points, traced.events + events, part.end, part.message, near, part.crossed, missed
+        )
+        curve = curve.on(points[-1].prepared) if points else curve
     return _with_crossed_folds(traced, usual)
+
+
+def _leaving(curve: Curve, now: Standing) -> Standing:
+    """A point with the tangent by which a path leaves it where loads may turn: some places yield, others unload.
+
+    ``curve`` remembers what has led to the point.  Its tangent there is elastic; that shortly beyond is the one.
+    """
+    rest = curve.standing(now.state, now.factor, replace(now.tangent, z=np.zeros_like(now.tangent.z)), arc=now.arc)
+    beyond = curve.corrected(*curve.predicted(rest, FINE), rest.tangent)
+    if beyond is None:
+        return rest
+    return replace(rest, tangent=beyond.tangent, point=beyond.point, doubtful=beyond.doubtful)
 
 
 def _with_crossed_folds(traced: Traced, usual: int) -> Traced:
@@ -217,7 +251,8 @@ class _Piece:
     """A stretch of a curve within one piece of the histories, in steps that change the factor by a stride at most.
 
     ``more`` is the number of steps that are still to be taken, ``budget`` the value of ``curve.searched`` at which the
-    stretch is given up.
+    stretch is given up; ``missing`` and ``missed`` are as of :func:`trace` and :class:`Traced`.  ``curve`` is that on
+    which the next step goes.
     """
 
     curve: Curve
@@ -233,12 +268,15 @@ class _Piece:
     near: list[float] = field(default_factory=list)
     watch: Callable[[Standing], Array] | None = None
     crossed: tuple[int, ...] = ()
+    missing: float = np.inf
+    missed: float = 0.0
 
     def traced(self) -> Traced:
         """The stretch from its first point on."""
         _, arrived = advanced(self.points[0], FIRST, self.trial, lambda _: self.ended(), shortest=SHORTEST)
         end, near = self.end if arrived else "lost", tuple(self.near)
-        return Traced(self.points, self.events, end, self.message, near, self.crossed if end == "margin" else ())
+        crossed = self.crossed if end == "margin" else ()
+        return Traced(self.points, self.events, end, self.message, near, crossed, self.missed)
 
     def ended(self) -> bool:
         """Whether no further step is to be taken; ``end`` says why not."""
@@ -253,7 +291,13 @@ class _Piece:
         curve, length = self.curve, min(length, _longest(self.curve, now, self.stride))
         there, left = _ahead(curve, now, self.before, length, self.span)
         there = None if there is None else self._within_margins(now, there)
-        if there is None:
+        corner = there is None and curve.remembers and 0.5 * length <= SHORTEST
+        if corner:
+            there, length = curve.around(now, FINE), FINE
+        if there is None or (corner and not self.span[0] <= there.factor <= self.span[1]):
+            return None, 0.0 if corner else 0.5 * length
+        missed = curve.missed(now, there)
+        if missed > max(self.missing * (there.arc - now.arc + SPREAD), BLURRED) and length >= FINE and not corner:
             return None, 0.5 * length
         if there is now:
             self.end = "margin"
@@ -263,9 +307,14 @@ class _Piece:
             self.end = "bent"
             return there, 0.0
         start, last = self.points[0], self.points[-1]
-        closed = not (left or self.crossed) and len(self.points) >= LOOP and _closes(curve, start, now, there)
+        # What remembers does not come back to where it began.
+        closes = not (left or self.crossed or curve.remembers) and len(self.points) >= LOOP
+        closed = closes and _closes(curve, start, now, there)
         ends = _to_start(curve, start, now, there) if closed else [there]
-        between = [events_between(curve, *pair) for pair in pairwise([last, *ends])]
+        between = [[]] if corner else [events_between(curve, *pair) for pair in pairwise([last, *ends])]
+        if corner and now.tangent.factor * there.tangent.factor < 0.0 and now is not start:
+            # It lies as near before the corner as steps can be short.
+            self.events.append(Event("limit", now))
         if None in between:
             if not self.near or abs(self.near[-1] - now.factor) > abs(there.factor - now.factor):
                 # Of shorter steps to the same place only the first is new.
@@ -278,7 +327,8 @@ class _Piece:
             self.events += met
             self.points += [event.standing for event in met if event.standing is not end] + [end]
         self.end = "margin" if self.crossed else "range" if left else "closed" if closed else ""
-        self.before, self.more = now, self.more - 1
+        self.before, self.more, self.missed = now, self.more - 1, self.missed + missed
+        self.curve = curve.following(there)
         return there, 0.0 if self.end else length * _growth(curve, now, there)
 
     def _within_margins(self, now: Standing, there: Standing) -> Standing | None:
@@ -334,10 +384,12 @@ def _ahead(
 
 
 def _same_curve(curve: Curve, now: Standing, there: Standing, expected: State, length: float) -> bool:
-    if curve.inner(now.tangent, there.tangent) < np.cos(SHARPEST * TURNING):
+    # Where many places begin to yield at once there is a corner, however short the step.
+    corner = curve.remembers and length < FINE
+    if curve.inner(now.tangent, there.tangent) < np.cos(SHARPEST * TURNING) and not corner:
         return False
     turned = length * largest_rotation(curve.equations, now.tangent.z)
-    if curve.prepared.distance(expected, there.state) > FAR * turned + SHORTEST:
+    if curve.prepared.distance(expected, there.state) > (CORNER if corner else FAR) * turned + SHORTEST:
         return False
     folded = now.tangent.factor * there.tangent.factor < 0.0
     changed = abs(there.inertia.negative - now.inertia.negative)
