@@ -382,10 +382,15 @@ class Fields:
         return np.concatenate(found)
 
     def _along(self, member: str, x: Array, *, pressed: bool = True) -> dict[str, Array]:
-        """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted.
+        """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted."""
+        return self._shared(member, x, pressed)[0]
 
-        Force and moment are those of the section alone; ``taken`` is the force that tendons along the member carry.
-        """
+    def taken(self, member: str, x: Array) -> Array:
+        """Force (n, 3) that tendons along a member carry through its sections at fractions x, dimensionless."""
+        return self._shared(member, x, pressed=False)[1]
+
+    def _shared(self, member: str, x: Array, pressed: bool) -> tuple[dict[str, Array], Array]:
+        """As :meth:`_along`, of the section alone, and the force (n, 3) that tendons along the member carry beside it."""
         model = self.model
         part = model.elements_of(member)
         at, pull = self._stations(member, x), self._pull[part]
@@ -401,11 +406,7 @@ class Fields:
         for touch in model.mesh.touches if pressed else ():
             if touch.member == member and touch.to is not None:
                 self._lay(touch, x, rotation, force, moment)
-        return {"position": position, "rotation": rotation, "force": force, "moment": moment, "taken": taken}
-
-    def taken(self, member: str, x: Array) -> Array:
-        """Force (n, 3) that tendons along a member carry through its sections at fractions x, dimensionless."""
-        return self._along(member, x, pressed=False)["taken"]
+        return {"position": position, "rotation": rotation, "force": force, "moment": moment}, taken
 
     def _strung(self, member: str, x: Array, rotation: Array, moment: Array) -> tuple[Array, Array]:
         """Moment and force (n, 3) that tendons along a member carry at its sections, dimensionless."""
