@@ -390,7 +390,7 @@ class Fields:
         return self._shared(member, x, pressed=False)[1]
 
     def _shared(self, member: str, x: Array, pressed: bool) -> tuple[dict[str, Array], Array]:
-        """As :meth:`_along`, of the section alone, and the force (n, 3) that tendons along the member carry beside it."""
+        """As :meth:`_along`, and the force (n, 3) that tendons along the member carry beside the section."""
         model = self.model
         part = model.elements_of(member)
         at, pull = self._stations(member, x), self._pull[part]
