@@ -450,8 +450,6 @@ def test_a_string_too_short_at_the_begin_is_refused():
 def test_what_needs_smooth_equations_is_refused(scene, number, tmp_path):
     search = r"(whether a tendon is slack|which stops act) is found by a search"
     with pytest.raises(SceneError, match=search):
-        sfetcas.parametric(scene, [number], ["nodes.B.position"])
-    with pytest.raises(SceneError, match=search):
         sfetcas.export(scene, tmp_path)
     with pytest.raises(SceneError, match=search):
         sfetcas.Design(scene)

@@ -20,7 +20,7 @@ __all__ = [
     "check_driving",
     "check_masses",
     "check_no_contact",
-    "check_one_sided",
+    "check_unilateral",
     "check_velocities",
 ]
 
@@ -60,7 +60,7 @@ def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], spring
             raise SceneError(message, ("springs", name, "stop"))
 
 
-def check_one_sided(analysis: Analysis, springs: Mapping[str, Spring], tendons: Mapping[str, Tendon]) -> None:
+def check_unilateral(analysis: Analysis, springs: Mapping[str, Spring], tendons: Mapping[str, Tendon]) -> None:
     """Refuse stops and slack tendons with integrators that do not find when they act.
 
     Raises

@@ -31,7 +31,7 @@ from .moving import (
     check_driving,
     check_masses,
     check_no_contact,
-    check_one_sided,
+    check_unilateral,
     check_velocities,
 )
 from .obstacles import check_start, members_of, obstacle
@@ -878,7 +878,7 @@ def _check_moving(scene: Scene) -> None:
     if analysis.moves:
         check_no_contact(analysis, scene.contacts, scene.springs)
     if analysis.type == "dynamic":
-        check_one_sided(analysis, scene.springs, scene.tendons)
+        check_unilateral(analysis, scene.springs, scene.tendons)
         check_driving(analysis, scene.nodes, scene.members, scene.motions, scene.histories, scene.tendons)
 
 

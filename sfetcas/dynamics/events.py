@@ -1,6 +1,6 @@
-"""Events of a motion with one-sided rows: when rows begin and cease to act, and what an impact does to velocities.
+"""Events of a motion with unilateral constraints: when they begin and cease to act, and what impacts do to velocities.
 
-Each one-sided row has an opening, which is not below zero, and a force, which is not either; one of them is zero.
+Each constraint has an opening, which is not below zero, and a force, which is not either; one of them is zero.
 Between events the motion is that of a system in which the rows that act are constraints, and the others are absent.
 
 - The force of a row falls through zero: it ceases to act.  Velocities do not change.
@@ -45,7 +45,7 @@ class Event:
     ----------
     t : float
     row : int
-        Its number among the one-sided ones.
+        Its number among the unilateral ones.
     acts : bool
         Whether it acts from then on.
     impulse : float
@@ -67,7 +67,7 @@ class Events:
     Parameters
     ----------
     stepper : Stepper
-        Of a system with one-sided rows.
+        Of a system with unilateral constraints.
     span : float
         Dimensionless time of the whole motion.
 
@@ -78,7 +78,7 @@ class Events:
 
     def __init__(self, stepper: Stepper, span: float) -> None:
         self.stepper, self.system, self._span = stepper, stepper.system, span
-        self.rows, self.signs = self.system.one_sided.rows, self.system.one_sided.signs
+        self.rows, self.signs = self.system.unilateral.rows, self.system.unilateral.signs
         self._impacts, self.found = Impacts(self.system), list[Event]()
         self._offset = np.zeros(len(self.rows))
         # Times of events, and the times and speeds of impacts.
@@ -130,7 +130,7 @@ class Events:
         self._times.append(memory.t)
         if len(self._times) > MOST and memory.t - self._times[-MOST - 1] < BRIEF * self._span:
             seconds = memory.t * self.stepper.time
-            names = ", ".join(dict.fromkeys(self.system.one_sided.names[event.row] for event in self.found[-MOST:]))
+            names = ", ".join(dict.fromkeys(self.system.unilateral.names[event.row] for event in self.found[-MOST:]))
             detail = f"at {seconds:.9g} s one impact or release follows another, {MOST} of them, of {names}"
             raise SolveError(Status.STOPPED, detail, memory)
 
@@ -283,7 +283,7 @@ class Events:
             # Waves that are shorter than the step make what is true at once untrue a little later.
             h *= SHORTER
         seconds = memory.t * self.stepper.time
-        names = ", ".join(np.array(self.system.one_sided.names)[touching].tolist())
+        names = ", ".join(np.array(self.system.unilateral.names)[touching].tolist())
         raise SolveError(Status.STOPPED, f"at {seconds:.9g} s no choice of what acts holds, of {names}", memory)
 
     def _tried(self, memory: Memory, acting: Array, touching: Array, h: float) -> tuple[Array, Array | None]:

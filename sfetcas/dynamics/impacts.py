@@ -30,7 +30,7 @@ __all__ = ["Collision", "Impacts"]
 
 
 class Impacts:
-    """Masses and rows of a system with one-sided rows, at any state."""
+    """Masses and rows of a system with unilateral constraints, at any state."""
 
     def __init__(self, system: StageEquations) -> None:
         self.system = system
@@ -63,7 +63,7 @@ class Collision:
 
     def __init__(self, impacts: Impacts, memory: Memory) -> None:
         system, unit = impacts.system, impacts.system.masses.time
-        self._system, self._rows, self._signs = system, system.one_sided.rows, system.one_sided.signs
+        self._system, self._rows, self._signs = system, system.unilateral.rows, system.unilateral.signs
         self._state = State(memory.q, memory.y, memory.lam, memory.unwrapped)
         self._factors = system.factors(memory.t)
         rates = [0.0 if history is None else history.rate(memory.t * unit) for history in system.histories]

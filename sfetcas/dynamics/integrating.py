@@ -54,7 +54,7 @@ class Memory:
     remembered : ndarray
         What members remember, see :class:`~sfetcas.mechanics.memory.Remembering`.
     acting : ndarray
-        For each one-sided row of the system whether it acts, 1 or 0.
+        For each unilateral constraint of the system whether it acts, 1 or 0.
     lost : float
         Energy lost in impacts so far.
     """

@@ -33,7 +33,7 @@ class InitialState:
     x, v : ndarray (quantities,)
         Quantities that carry mass or are damped, and their rates.
     touching : ndarray (rows,)
-        One-sided rows that may act at once: 1 of those that are closed, else 0.
+        Unilateral constraints that may act at once: 1 of those that are closed, else 0.
     """
 
     state: State
@@ -97,7 +97,7 @@ class Integrator(abc.ABC):
     record : StepRecord or None
         The steps so far; None where there is nothing to interpolate between them with.
     events : list of Event
-        What one-sided rows have done so far.
+        What unilateral constraints have done so far.
     """
 
     record: StepRecord | None = None
@@ -149,7 +149,7 @@ class Stages(Integrator):
         memory = Memory(0.0, *given, remembered=begin, acting=begun.touching)
         self._sampler, self.record = Sampler(course.times, method.stages), StepRecord(method.stages)
         first = None if course.step is not None else max(FIRST * course.end, min(course.end, SHORTEST))
-        events = Events(stepper, course.end) if len(self.system.one_sided) else None
+        events = Events(stepper, course.end) if len(self.system.unilateral) else None
         if events is not None:
             self.events = events.found
             memory = events.begun(memory, course.step or first or course.end)

@@ -48,16 +48,17 @@ class Mover:
     def __init__(self, equations: Equations, inertia: Inertia, time: float, factors: Callable[[float], Array]) -> None:
         self.equations, self.inertia, self.time, self.factors = equations, inertia, time, factors
         self.model: Model = equations.model
-        self.memory, self.one_sided = Remembering(self.model), inertia.system.one_sided
+        self.memory, self.unilateral = Remembering(self.model), inertia.system.unilateral
         self._models: dict[bytes, Equations] = {}
         self._redundant: bool | None = None
 
     def event(self, event: Event) -> StopEvent:
-        """What happens to a one-sided row, by name."""
-        scales, (name, side) = self.model.scales, self.one_sided.parts[event.row]
-        turns = side != "taut" and self.model.scene.springs[name].type == "rotational"
+        """What happens to a unilateral constraint, by name."""
+        scales, part = self.model.scales, self.unilateral.parts[event.row]
+        turns = part.table == "springs" and self.model.scene.springs[part.name].type == "rotational"
+        side = "taut" if part.table == "tendons" else part.side
         impulse = event.impulse * (scales.moment if turns else scales.force) * self.time
-        where = self.one_sided.names[event.row]
+        where = self.unilateral.names[event.row]
         return StopEvent(event.t * self.time, where, side, event.acts, impulse, event.lost * scales.moment, turns)
 
     def instant(self, sample: Sample) -> MotionState:
@@ -66,10 +67,10 @@ class Mover:
         if self.memory.size:
             model = self.memory.model_with(sample.remembered)
             equations = equations.remembering(model)
-        if len(self.one_sided):
+        if len(self.unilateral):
             equations = self.acting(sample.acting)
             model = equations.model
-        loading = system.loading_of(model, sample.t) if len(self.one_sided) else system.loading(self.factors(sample.t))
+        loading = system.loading_of(model, sample.t) if len(self.unilateral) else system.loading(self.factors(sample.t))
         free = system.state_of(model, State(sample.q, sample.y, np.zeros(0), sample.unwrapped))
         point = equations.at(free, loading)
         forces = self.inertia.forces(sample.v, sample.a)
@@ -90,10 +91,10 @@ class Mover:
         )
 
     def acting(self, acting: Array) -> Equations:
-        """The equations of the model in which one-sided rows act as told, (rows,), 1 or 0."""
+        """The equations of the model in which unilateral constraints act as told, (rows,), 1 or 0."""
         found = self._models.get(acting.tobytes())
         if found is None:
-            model, stops = self.model, self.one_sided.stops(acting)
+            model, stops = self.model, self.unilateral.stops(acting)
             mesh = replace(model.mesh, stops=stops)
             alone = assemble(model.scene, mesh, assembly=model.assembly, scales=model.scales, like=model)  # type: ignore[arg-type]
             found = self._models[acting.tobytes()] = Equations(alone, kernels="interpreted")
@@ -108,7 +109,7 @@ class Mover:
         factor_closings(equations, point)
         right = np.concatenate([-point.residual[:n], np.zeros(equations.rows)])
         state = replace(free, lam=np.asarray(equations.solver.solve(right)[n:]))
-        if self._redundant is False and not len(self.one_sided):
+        if self._redundant is False and not len(self.unilateral):
             return state
         # What is straight where it begins may be bent later, but hardly the other way round.
         loose = loose_rows(equations, point)

@@ -47,7 +47,7 @@ class Sample:
     remembered : ndarray
         What members remember at the begin of the step in which it is.
     acting : ndarray
-        Which one-sided rows act, see :class:`~sfetcas.dynamics.integrating.Memory`.
+        Which unilateral constraints act, see :class:`~sfetcas.dynamics.integrating.Memory`.
     lost : float
         Energy lost in impacts so far.
     """

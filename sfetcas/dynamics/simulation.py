@@ -26,7 +26,7 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
-from ..mechanics.one_sided import all_stops, one_sided_of
+from ..mechanics.unilateral import all_stops, rows_of
 from ..stopping import arrived
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
 from .conserving import Conserving
@@ -169,13 +169,13 @@ class Simulation:
         analysis = self.scene.analysis
         steps = USUAL_STEPS if before is None else 2 * before
         steps = steps if analysis.step is None else int(analysis.duration / analysis.step)
-        one_sided = one_sided_of(model)
-        system = StageEquations(equations, masses, self.settings.kernels, CALLS * max(steps, 1), one_sided)
+        unilateral = rows_of(model)
+        system = StageEquations(equations, masses, self.settings.kernels, CALLS * max(steps, 1), unilateral)
         integrator = INTEGRATORS[self.name](system, self.progress)
         self.seconds["model"] += built - begin
         self.seconds["build"] += time.perf_counter() - built
         mover = Mover(equations, Inertia(system), masses.time, system.factors)
-        begun, notes = self.begun(system, mover.acting(np.zeros(len(one_sided))) if len(one_sided) else None)
+        begun, notes = self.begun(system, mover.acting(np.zeros(len(unilateral))) if len(unilateral) else None)
         beyond = min((t for t in self._kinks if t >= analysis.duration), default=np.inf)
         watch = None if analysis.until is None else Watch(analysis.until, mover)
         times = self.times if watch is None else finer(self.times)
@@ -208,7 +208,7 @@ class Simulation:
         if watch is None or not watch.ended:
             run.instants += [mover.instant(sample) for sample in integrator.rest()]
         if watch is not None:
-            record = integrator.record if len(one_sided) else None
+            record = integrator.record if len(unilateral) else None
             run.instants = watch.up_to_end(run.instants, self.times, None if record is None else record.sample)
             run.notes = (*run.notes, watch.note(run.instants))
         run.count, run.gap, run.norm, run.record = integrator.count, integrator.gap, integrator.norm, integrator.record
@@ -230,7 +230,7 @@ class Simulation:
             raise SolveError(status, f"at {instant.time:.6g} s: {message}")
 
     def begun(self, system: StageEquations, free: Equations | None = None) -> tuple[InitialState, tuple[str, ...]]:
-        """Where the motion begins, and what is to be said of it; ``free`` are equations without one-sided rows."""
+        """Where the motion begins, and what is to be said of it; ``free`` are equations without unilateral ones."""
         model = system.model
         state = at_rest(model)
         notes: tuple[str, ...] = ()
@@ -263,8 +263,8 @@ class Simulation:
         return InitialState(state, rates, *system.rates(state, factors, rates), touching), (*notes, *more)
 
     def _touching(self, system: StageEquations, state: State) -> Array:
-        """One-sided rows that may act at the begin, (rows,), 1 or 0."""
-        rows = system.one_sided
+        """Unilateral constraints that may act at the begin, (rows,), 1 or 0."""
+        rows = system.unilateral
         if not len(rows):
             return np.zeros(0)
         if self.scene.analysis.initial == "equilibrium":
@@ -488,8 +488,8 @@ class _Beginning:
 
     def __init__(self, system: StageEquations, touching: Array | None = None) -> None:
         n = system.layout
-        touching = np.zeros(len(system.one_sided)) if touching is None else touching
-        rows = system.one_sided.rows[touching == 0.0]
+        touching = np.zeros(len(system.unilateral)) if touching is None else touching
+        rows = system.unilateral.rows[touching == 0.0]
         self._touching, self._idle = touching, system.equations.unknowns + rows
         q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
         factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)

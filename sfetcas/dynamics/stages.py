@@ -77,7 +77,7 @@ class StageEquations(System):
         stages = residual.shape[1]
         system = self._system(stages)
         dual = [-DUAL_REGULARISATION / part for part in inertia]
-        if len(self.one_sided):
+        if len(self.unilateral):
             dual += [-(1.0 - self.acting(unwrapped)) / (DUAL_REGULARISATION * part) for part in inertia]
         matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries, *dual)))
         left = ca.vec(residual.T)
@@ -149,8 +149,8 @@ class StageEquations(System):
         blocks += [(i, j, coupled, probe.coupled.count) for i in range(stages) for j in range(stages)]
         rows = np.arange(self.equations.unknowns, self.total)
         blocks += [(i, i, (rows, rows, np.ones(len(rows)), np.zeros(len(rows), np.intp)), 1) for i in range(stages)]
-        if len(self.one_sided):
-            own = self.equations.unknowns + self.one_sided.rows
+        if len(self.unilateral):
+            own = self.equations.unknowns + self.unilateral.rows
             blocks += [(i, i, (own, own, np.ones(len(own)), np.arange(len(own))), len(own)) for i in range(stages)]
         size, first, flat, weights, entries = self.total * stages, 0, [], [], []
         for i, j, (r, c, weight, number), count in blocks:
@@ -238,7 +238,7 @@ class _Stage:
             entries.append(ca.vec(found[4]))
             self._rotation_jacobians.append(found[5])
         self.residual = static.gathered(shares)
-        if len(system.one_sided):
+        if len(system.unilateral):
             n = system.equations.unknowns
             self.residual = ca.vertcat(self.residual[:n], system.switched(self.residual[n:], unwrapped))
         self.entries = ca.vertcat(*entries, ca.MX(1))

@@ -27,9 +27,9 @@ from ..mechanics.loading import Loading
 from ..mechanics.masses import Masses, Observables
 from ..mechanics.memory import Remembering
 from ..mechanics.model import Model
-from ..mechanics.one_sided import NONE, OneSided
 from ..mechanics.singles import arms_product, weighted_product
 from ..mechanics.terms import rows_of
+from ..mechanics.unilateral import NONE, UnilateralRows
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -56,7 +56,7 @@ class System(Expressions):
         ``compiled``, ``interpreted`` or ``auto`` element functions.
     calls : float
         Expected number of calls, by which ``auto`` decides.
-    one_sided : OneSided
+    unilateral : UnilateralRows
         Rows that are switched on and off in time; the model contains all of them.
     """
 
@@ -68,14 +68,14 @@ class System(Expressions):
         masses: Masses,
         kernels: Kernels = "auto",
         calls: float = 1e4,
-        one_sided: OneSided = NONE,
+        unilateral: UnilateralRows = NONE,
     ) -> None:
         super().__init__(equations, kernels, calls)
         if len(self.model.positions.E.value):
             raise ValueError("motion needs the nodal assembly on a mesh with a place at every cut")
         self.masses, self.memory = masses, Remembering(self.model)
         self._memory = {number: (group, part) for number, group, part in self.memory.parts()}
-        self.one_sided = one_sided
+        self.unilateral = unilateral
         self.observed = [self.tables.sides_of(group) for group in masses.observables]
         self._place()
         self._weigh()
@@ -140,9 +140,9 @@ class System(Expressions):
         sizes = [group.kind.sizes[2] * len(group.data) for group in masses.observables]
         bounds = np.cumsum([self.linear, *sizes]).tolist()
         self.ranges = list(zip(bounds, bounds[1:], strict=False))
-        # What members remember, and which one-sided rows act, is given with the angles that count turns, and changes
-        # as seldom.
-        given = self.layout.unwrapped + self.memory.size + len(self.one_sided)
+        # What members remember, and which unilateral constraints act, is given with the angles that count turns, and
+        # changes as seldom.
+        given = self.layout.unwrapped + self.memory.size + len(self.unilateral)
         self.layout = Layout(**{**vars(self.layout), "unwrapped": given}, x=bounds[-1])
 
     def data(self, number: int, given: Given, unwrapped: ca.MX) -> ca.MX:
@@ -157,25 +157,25 @@ class System(Expressions):
         return data
 
     def counted(self, state: State, acting: Array | None = None) -> Array:
-        """The angles that count turns in a state, what members remember at the begin, and which one-sided rows act.
+        """The angles that count turns in a state, what members remember at the begin, which unilateral constraints act.
 
         By default all do.
         """
-        acting = np.ones(len(self.one_sided)) if acting is None else acting
+        acting = np.ones(len(self.unilateral)) if acting is None else acting
         return np.concatenate([state.unwrapped, self.memory.begun[: self.memory.size], acting])
 
     def switched(self, rows: ca.MX, unwrapped: ca.MX) -> ca.MX:
-        """Numbers of the rows (rows,), such as gaps or multipliers, zero where a one-sided row does not act."""
-        count = len(self.one_sided)
+        """Numbers of the rows (rows,), such as gaps or multipliers, zero where a unilateral constraint does not act."""
+        count = len(self.unilateral)
         if not count:
             return rows
         acting = ca.MX.ones(self.layout.lam)
-        acting[self.one_sided.rows.tolist()] = self.acting(unwrapped)
+        acting[self.unilateral.rows.tolist()] = self.acting(unwrapped)
         return rows * acting
 
     def acting(self, unwrapped: ca.MX) -> ca.MX:
-        """For each one-sided row whether it acts, 1 or 0."""
-        return unwrapped[self.layout.unwrapped - len(self.one_sided) :]
+        """For each unilateral constraint whether it acts, 1 or 0."""
+        return unwrapped[self.layout.unwrapped - len(self.unilateral) :]
 
     def _along(self, *, timed: bool) -> ca.Function:
         """(q, y, factors, unwrapped, step, faster) -> quantities and their derivative along a step of the unknowns.
@@ -265,7 +265,7 @@ class System(Expressions):
         """This system with interpreted kernels: compiled functions cannot be differentiated by CasADi."""
         if self._kernels == "interpreted":
             return self
-        return type(self)(self.equations, self.masses, "interpreted", one_sided=self.one_sided)
+        return type(self)(self.equations, self.masses, "interpreted", unilateral=self.unilateral)
 
     @functools.cached_property
     def histories(self) -> tuple[History | None, ...]:
@@ -285,26 +285,26 @@ class System(Expressions):
         return functools.reduce(Loading.plus, groups)
 
     def loading_of(self, model: Model, t: float) -> Loading:
-        """As :meth:`loading` at a dimensionless time, of a model of the same scene with other one-sided rows."""
+        """As :meth:`loading` at a dimensionless time, of a model of the same scene with another choice of them."""
         histories, seconds = model.scene.histories, t * self.masses.time
         factors = {name: 1.0 if name is None else histories[name].factor(seconds) for name in model.groups}
         groups = [loading.scaled(factors[name]) for name, loading in model.groups.items()]
         return functools.reduce(Loading.plus, [*groups, *model.standing])
 
     def state_of(self, model: Model, state: State) -> State:
-        """A state without multipliers, as one of a model of the same scene with other one-sided rows."""
+        """A state without multipliers, as one of a model of the same scene with other unilateral constraints."""
         names, own = self.model.unwrapping.names, model.unwrapping.names
         unwrapped = state.unwrapped if own == names else state.unwrapped[[names.index(name) for name in own]]
         return State(state.q, state.y, np.zeros(len(model.row_names)), unwrapped)
 
     def openings(self, state: State, t: float) -> Array:
-        """How far the one-sided rows (rows,) are open at a state and a dimensionless time; violated below zero."""
+        """How far unilateral constraints (rows,) are open at a state and a dimensionless time; violated below zero."""
         return np.array(self._opening(state.q.T, state.y, self.factors(t), self.counted(state))).ravel()
 
     @functools.cached_property
     def _opening(self) -> ca.Function:
-        """(q, y, factors, unwrapped) -> openings of the one-sided rows."""
-        n, rows = self.layout, self.one_sided
+        """(q, y, factors, unwrapped) -> openings of the unilateral constraints."""
+        n, rows = self.layout, self.unilateral
         q, y = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y)
         factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
         given = self.given(factors)

@@ -20,7 +20,8 @@ import numpy as np
 from ..description.scene import Scene
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import first_of_largest
-from ..mechanics.unilateral import ROUNDING, Stops, Unilateral, margins, switched_over, unilaterals
+from ..mechanics.margins import ROUNDING, margins
+from ..mechanics.unilateral import Stops, Unilateral, switched_over, unilaterals
 from .several import alike
 from .solution import Equilibrium, Solution, at_factor
 from .statics import Settings, solve

@@ -8,19 +8,19 @@ where a margin changes its sign the choice is another one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..description.scene import Scene
-from .fields import Fields
+import numpy as np
 
-__all__ = ["ROUNDING", "Stops", "Unilateral", "margins", "switched_over", "unilaterals"]
+from ..description.scene import Scene
+from ..mathematics.arrays import Array, Index
+from .model import Model
+
+__all__ = ["NONE", "Stops", "Unilateral", "UnilateralRows", "all_stops", "rows_of", "switched_over", "unilaterals"]
 
 Stops = tuple[tuple[str, str], ...]
 """A choice: springs at a stop: name, and low or high; tendons slack or let out: name, and slack or released."""
-
-ROUNDING = 1e-12
-"""Of margins: what has next to nothing to do stays as it is."""
 
 
 @dataclass(frozen=True)
@@ -75,23 +75,63 @@ def switched_over(stops: Stops, which: Iterable[Unilateral]) -> Stops:
     return tuple(sorted(stops))
 
 
-def margins(fields: Fields) -> Mapping[Unilateral, float]:
-    """The margin of each unilateral constraint at a state, in the choice of its mesh."""
-    scene, stops, scales = fields.model.scene, fields.model.mesh.stops, fields.model.scales
-    found: dict[Unilateral, float] = {}
-    for one in unilaterals(scene):
-        if one.table == "tendons":
-            pulls = one.active(stops)
-            found[one] = (
-                fields.tendon(one.name)["tension"] / scales.force if pulls else -fields.beyond(one.name) / scales.length
-            )
-            continue
-        state, limits, high = fields.spring(one.name), scene.springs[one.name].stop, one.side == "high"
-        assert limits is not None
-        if one.active(stops):
-            effort = (state.stop or 0.0) / (scales.moment if state.rotational else scales.force)
-            found[one] = -effort if high else effort
+# -- all of them in one model, switched on and off from one time to the next --------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class UnilateralRows:
+    """The rows of a model that contains all unilateral constraints.
+
+    Attributes
+    ----------
+    parts : tuple of Unilateral
+        What each is.
+    rows : ndarray (n,)
+        Their numbers among the rows.
+    signs : ndarray (n,)
+        1 where a row must not be above zero, and its multiplier not below; -1 where it is the other way round.
+    """
+
+    parts: tuple[Unilateral, ...]
+    rows: Index
+    signs: Array
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    @property
+    def names(self) -> list[str]:
+        """Where each stands in the scene."""
+        return [f"{part.table}.{part.name}" for part in self.parts]
+
+    def stops(self, acting: Array) -> Stops:
+        """The choice in which those are active whose number in ``acting`` (n,) is not zero."""
+        pairs = zip(self.parts, acting, strict=True)
+        return tuple(part.entry for part, now in pairs if bool(now) != (part.side == "slack"))
+
+    def acting(self, stops: Stops) -> Array:
+        """The numbers (n,), one of those that are active, of a choice."""
+        return np.array([part.active(stops) for part in self.parts], dtype=float)
+
+
+NONE = UnilateralRows((), np.zeros(0, np.intp), np.zeros(0))
+"""No row."""
+
+
+def all_stops(scene: Scene) -> Stops:
+    """The choice in which all are active."""
+    return tuple(part.entry for part in unilaterals(scene) if part.table == "springs")
+
+
+def rows_of(model: Model) -> UnilateralRows:
+    """The rows of a model in which all unilateral constraints of its scene are active; none where it has none."""
+    parts, names = unilaterals(model.scene), model.row_names
+    found = []
+    for part in parts:
+        if part.table == "tendons":
+            found.append(names.index(f"tendons.{part.name}"))
         else:
-            left = limits[1] - state.travel if high else state.travel - limits[0]
-            found[one] = left / (1.0 if state.rotational else scales.length)
-    return found
+            both = [i for i, row in enumerate(names) if row == f"springs.{part.name}.stop"]
+            found.append(both[part.side == "high"])
+    signs = [-1.0 if part.side == "low" else 1.0 for part in parts]
+    return UnilateralRows(parts, np.array(found, dtype=np.intp), np.array(signs))

@@ -23,8 +23,9 @@ from ..equilibria.stops import settled
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.fields import Fields, transferred
+from ..mechanics.margins import margins
 from ..mechanics.mesh import Mesh
-from ..mechanics.unilateral import Stops, Unilateral, margins, switched_over, unilaterals
+from ..mechanics.unilateral import Stops, Unilateral, switched_over, unilaterals
 from ..solvers.arclength import PASSING, Curve, Standing, Tangent
 from ..solvers.beginning import begin_path
 from ..solvers.critical import Event, at_factors
