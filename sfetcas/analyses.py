@@ -77,8 +77,16 @@ def solve(
             from .dynamics.modes import find_modes
 
             return find_modes(scene, settings)
-        stopped = scene.stopped or scene.reversed
-        return stops.solve_stopped(scene, settings) if stopped else statics.solve(scene, settings)
+        if not (scene.stopped or scene.reversed):
+            return statics.solve(scene, settings)
+        try:
+            return stops.solve_stopped(scene, settings)
+        except SolveError as error:
+            if not scene.stopped or scene.contacts or settings.accuracy_of or scene.analysis.equilibria == "all":
+                raise
+            from .paths.steps_along import steps_along
+
+            return steps_along(scene, settings, error)
     except np.linalg.LinAlgError as error:
         raise SolveError(Status.FAILED, f"{FAR_APART}: {error}") from None
 

@@ -218,6 +218,7 @@ ORDER = [
     "paths.switching",
     "paths.memory_path",
     "paths.paths",
+    "paths.steps_along",
     "parametric",
     "parametric.results",
     "parametric.sliding_tubes",

@@ -11,6 +11,7 @@ from test_stops import STOP, clamped, lever
 
 from sfetcas import Scene, SceneError, SolveError, Status, check, load, parametric, solve, switch
 from sfetcas.cli import main
+from sfetcas.mechanics.margins import margins
 
 ALWAYS = {"one": {"t": [-100, 100], "value": [1, 1]}}
 """A history with which lengths of strings do not grow with the factor."""
@@ -321,6 +322,17 @@ def against_steps(seed):
 def test_paths_at_random_pass_through_load_steps(first, last, least):
     """Of the load steps some are not found: they begin with all strings taut, where the scene may have other shapes."""
     assert sum(map(against_steps, range(first, last))) >= least
+
+
+@pytest.mark.parametrize("seed", [4, 9])
+def test_a_step_that_the_search_does_not_find_is_found_along_a_path(seed):
+    """All that may be slack or at a stop is on its right side, and the energy is least."""
+    table = random_table(seed)
+    step = at(table, 0.8)
+    assert any("along a path" in note for note in step.notes)
+    assert step.certificate.stable
+    # Of tensions and gaps rounding is left.
+    assert min(margins(step.fields).values()) > -1e-9
 
 
 # -- parameters -----------------------------------------------------------------------------------------
