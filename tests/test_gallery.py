@@ -98,6 +98,8 @@ def test_documentation_of_a_problem_that_is_not_solved_fails_and_names_it(folder
     assert not list(entries.GALLERY.glob("*.md"))
 
 
+# The parser of pages resolves links by a name that Sphinx is about to drop; no matter of these pages.
+@pytest.mark.filterwarnings("ignore:'myst_parser.*is deprecated")
 def test_names_are_text_on_pages(folder):
     """What a browser is given has no markup of theirs."""
     quoted = '"' + HOSTILE.replace("\\", "\\\\").replace('"', '\\"') + '"'
@@ -111,7 +113,8 @@ def test_names_are_text_on_pages(folder):
     (source / "a" / "b" / "bent.md").write_text(page, encoding="utf-8")
     (source / "a" / "b" / "pictures").mkdir()
     (source / "a" / "b" / "pictures" / "bent.png").write_bytes((entries.PICTURES / "bent.png").read_bytes())
-    (source / "index.md").write_text("# Index\n\n```{toctree}\na/b/bent\n```\n", encoding="utf-8")
+    (source / "a" / "b" / f"{gallery._file_of(entry.group)}.md").write_text("# Group\n", encoding="utf-8")
+    (source / "index.md").write_text(f"# Index\n\n```{{toctree}}\na/b/{gallery._file_of(entry.group)}\n```\n", encoding="utf-8")
     settings = {
         "extensions": ["myst_parser"],
         "smartquotes": False,
