@@ -18,7 +18,12 @@ if TYPE_CHECKING:
 
 __all__ = ["LATER", "solve"]
 
-LATER = ("sfetcas.dynamics.modes", "sfetcas.dynamics.simulation", "sfetcas.paths.paths")
+LATER = (
+    "sfetcas.dynamics.modes",
+    "sfetcas.dynamics.simulation",
+    "sfetcas.paths.paths",
+    "sfetcas.paths.steps_along",
+)
 """What :func:`~sfetcas.solve` imports for some analyses only; servers that start worker processes preload it."""
 
 

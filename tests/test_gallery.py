@@ -114,7 +114,9 @@ def test_names_are_text_on_pages(folder):
     (source / "a" / "b" / "pictures").mkdir()
     (source / "a" / "b" / "pictures" / "bent.png").write_bytes((entries.PICTURES / "bent.png").read_bytes())
     (source / "a" / "b" / f"{gallery._file_of(entry.group)}.md").write_text("# Group\n", encoding="utf-8")
-    (source / "index.md").write_text(f"# Index\n\n```{{toctree}}\na/b/{gallery._file_of(entry.group)}\n```\n", encoding="utf-8")
+    (source / "index.md").write_text(
+        f"# Index\n\n```{{toctree}}\na/b/{gallery._file_of(entry.group)}\n```\n", encoding="utf-8"
+    )
     settings = {
         "extensions": ["myst_parser"],
         "smartquotes": False,
