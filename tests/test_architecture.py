@@ -170,6 +170,7 @@ ORDER = [
     "equilibria",
     "equilibria.mirrors",
     "equilibria.solution",
+    "equilibria.force_balance",
     "equilibria.quantities",
     "equilibria.several",
     "equilibria.scanning",

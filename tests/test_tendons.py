@@ -1,6 +1,7 @@
 """Tendons and chambers: closed forms, shooting, published robots, energies, and every analysis."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -627,6 +628,28 @@ def test_touching_an_obstacle(pull, way):
     # The accuracy asked for.
     np.testing.assert_allclose(touching.position("B"), loaded.position("B"), atol=1e-8)
     assert touching.tendon("t")["length"] == pytest.approx(loaded.tendon("t")["length"], abs=1e-8)
+
+
+@pytest.mark.parametrize("friction", [{}, {"friction": 0.2}, {"friction": 0.2, "pulled_at": "end"}])
+@pytest.mark.parametrize("kind", ["flexible", "rigid"])
+def test_from_the_ground_to_what_touches_an_obstacle(kind, friction):
+    """The pull of the ground is in the balance, and the contact force as a load leaves everything where it was."""
+    if kind == "rigid":
+        scene = sfetcas.load(Path(__file__).parent.parent / "problems" / "tendon_finger.toml").replace(expect=())
+        scene = scene.replace({f"tendons.flexor.{key}": value for key, value in friction.items()})
+        round_one, member, node = {"center": [0.055, 0.045], "radius": 0.02}, "distal", "tip"
+    else:
+        way = [{"ground": [-0.2, 0.08]}, {"member": "m", "offset": 0.08, "discs": 8}]
+        scene = rod(way, pull=0.12, **friction)
+        round_one, member, node = {"center": [0.6, 0.35], "radius": 0.2}, "m", "B"
+    scene = scene.replace({"analysis.accuracy": 1e-8})
+    touching = sfetcas.solve(scene.replace(contacts={"ball": {"type": "circle", **round_one, "members": "all"}})).last
+    found = touching.contacts["ball"]
+    assert found["member"] == member
+    load = {"type": "force", "member": member, "at": found["at"], "value": found["force"][:2].tolist()}
+    loaded = sfetcas.solve(scene.replace(loads={"f": load})).last
+    # The accuracy asked for.
+    np.testing.assert_allclose(touching.position(node), loaded.position(node), atol=1e-8)
 
 
 def test_beside_an_obstacle_all_forces_are_rounding():

@@ -7,17 +7,11 @@ answer is refused.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
-import numpy as np
-
-from .. import tolerances
 from ..errors import SolveError, Status
 from ..mechanics.fields import Fields
 from .touches import Touched
 
-__all__ = ["refuse_lost_forces", "refuse_unbalanced"]
+__all__ = ["SHARE", "refuse_unbalanced"]
 
 SHARE = 1e-5
 """Smallest forces and moments that count, share of the largest; errors of contact places are a thousandth of this."""
@@ -41,27 +35,3 @@ def refuse_unbalanced(fields: Fields) -> None:
             what = f"pull with {lost.pull:.3g} N" if pulled else f"hold a moment of {lost.couple:.3g} N m"
             detail = f"{touch.member} lies on {touch.contact}, which would have to {what} {where} within the stretch"
             raise SolveError(Status.FAILED, f"{detail}; the member lifts off there, which was not found", fields.state)
-
-
-def refuse_lost_forces(fields: Fields, pushes: Sequence[Any]) -> None:
-    """Refuse an answer whose reactions and contact forces ``pushes``, (3,) or (n, 3) N each, do not balance the loads.
-
-    Raises
-    ------
-    SolveError
-        A force is missing; the message has its components.
-    """
-    scene = fields.model.scene
-    if any(spring.type == "translational" and spring.to is None for spring in scene.springs.values()):
-        return
-    supported = [name for name, node in scene.nodes.items() if node.support != "free"]
-    forces = [fields.reaction(name)[0] for name in supported]
-    forces += [np.reshape(push, (-1, 3)).sum(axis=0) for push in pushes]
-    missing = np.sum([*forces, fields.total_load], axis=0)
-    # Tendons and natural curvature bend what nothing holds from outside: then all forces are rounding.
-    least = tolerances.UNIT * fields.model.scales.force
-    size = max([least, *(float(np.abs(force).max()) for force in [*forces, fields.total_load])])
-    if float(np.abs(missing).max()) > SHARE * size:
-        found = ", ".join(f"{entry:.3g}" for entry in missing)
-        detail = f"a force of ({found}) N acts where a stretch lies on an obstacle, and was not brought into balance"
-        raise SolveError(Status.FAILED, detail, fields.state)

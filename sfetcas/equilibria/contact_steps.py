@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from ..contact.contact_balance import refuse_lost_forces, refuse_unbalanced
+from ..contact.contact_balance import refuse_unbalanced
 from ..contact.contact_statics import ContactRun, Pressed
 from ..contact.settling import Held
 from ..errors import SolveError, Status
 from ..solvers.prepared import Prepared
+from .force_balance import refuse_lost_forces
 from .meshing import EquilibriumResult, Meshing
 from .refinement import Refinement
 from .single import finished, unjudged
@@ -47,8 +48,9 @@ class ContactSteps:
         contact = self.run
         base = self.meshes.pilot_mesh.refined()
         notes: tuple[str, ...] = () if pilot.model.conservative else (NO_ENERGY,)
-        falls = bool(pilot.diagnosis.mobility) and not contact.first_touches
-        known = pilot.model.minimisable and not (pilot.diagnosis.mobility or pilot.lacks_slack)
+        # Without an energy nothing can be let fall: then growing loads are the way of mechanisms too.
+        falls = bool(pilot.diagnosis.mobility) and pilot.model.minimisable and not contact.first_touches
+        known = not pilot.model.minimisable or not (pilot.diagnosis.mobility or pilot.lacks_slack)
         if known and not (self.ways.started or contact.last or contact.first_touches):
             found = self._clear_all_the_way(pilot, factor)
             if found is not None:
@@ -133,5 +135,5 @@ class ContactSteps:
             notes=found.notes,
             way=way,
         )
-        refuse_lost_forces(held.touched.fields, [answer.contacts[name]["force"] for name in self.scene.contacts])
+        refuse_lost_forces(answer)
         return answer

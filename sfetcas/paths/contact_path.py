@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import tolerances
-from ..contact.contact_balance import refuse_lost_forces, refuse_unbalanced
+from ..contact.contact_balance import refuse_unbalanced
 from ..contact.contact_statics import ContactRun
 from ..contact.touches import COARSE
 from ..description.scene import Scene
 from ..equilibria import statics
+from ..equilibria.force_balance import refuse_lost_forces
 from ..equilibria.meshing import Meshing
 from ..equilibria.settings import Settings
 from ..equilibria.single import finished
@@ -209,7 +210,7 @@ class ContactPath:
         stability, notes = run.certified(held, point.factor)
         estimate = error if error is not None and np.isfinite(error) else None
         answer = finished(held.corrected, stability, error_estimate=estimate, notes=notes)
-        refuse_lost_forces(held.touched.fields, [answer.contacts[name]["force"] for name in self.scene.contacts])
+        refuse_lost_forces(answer)
         return answer
 
     @staticmethod
