@@ -127,6 +127,7 @@ ORDER = [
     "mechanics.stationarity",
     "mechanics.balance",
     "mechanics.fields",
+    "mechanics.law_limits",
     "mechanics.margins",
     "mechanics.fronts",
     "mechanics.displacements",

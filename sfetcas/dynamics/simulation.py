@@ -23,6 +23,7 @@ from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.threads import single_threaded
 from ..mechanics.equations import Equations, State
+from ..mechanics.law_limits import first_beyond_laws
 from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
@@ -410,10 +411,7 @@ class Simulation:
 
     def _law_notes(self, run: MeshRun) -> tuple[str, ...]:
         """The first instant at which members bend beyond the laws of their sections."""
-        for instant in run.instants:
-            if notes := instant.fields.beyond_laws():
-                return tuple(f"at {instant.time:.6g} s {note}" for note in notes)
-        return ()
+        return first_beyond_laws((f"at {instant.time:.6g} s", instant.fields) for instant in run.instants)
 
     def _unlikely(self, run: MeshRun) -> tuple[str, ...]:
         """Notes where a prescribed step, of which nothing estimates the error, is far too short or too long."""

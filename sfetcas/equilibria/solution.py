@@ -29,6 +29,7 @@ from ..mathematics.arrays import Array
 from ..mechanics.balance import SpringState
 from ..mechanics.equations import State
 from ..mechanics.fields import Fields
+from ..mechanics.law_limits import beyond_laws
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..solvers.prepared import Solved
@@ -659,7 +660,7 @@ def refuse_large(fields: Fields) -> None:
 def _notes(fields: Fields) -> Iterator[str]:
     """Notes on what the model leaves out, or is beyond its validity."""
     yield from superelement_notes(fields)
-    yield from fields.beyond_laws()
+    yield from beyond_laws(fields).values()
     yield from strain_notes(fields)
     yield from tendon_notes(fields)
 

@@ -18,14 +18,13 @@ from ..description.records import enumerated
 from ..description.tendons import Stretch
 from ..mathematics import curves, quaternion
 from ..mathematics.arrays import Array, first_of_largest, values_of
-from ..mathematics.forms import BOTH
 from ..mathematics.interpolation import differentiation, evaluation
 from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
 from .balance import three as _three
 from .batches import GroupBatch
 from .equations import Equations, State, gained_tangents, scaled_strains, turned_points, turned_tangents, yielded
-from .laws import curvature_by_moment, form_of, law_of, least_stiffness
+from .laws import curvature_by_moment, form_of
 from .loading import Loading
 from .magnetism import magnet_terms
 from .memory import dissipated_along
@@ -34,7 +33,7 @@ from .relaxation import carried, relax
 from .segments import pulled_place
 from .singles import fibre_strain
 from .stations import Stations
-from .stretch_laws import least_tangent, strain_by_force, stretch_law_of
+from .stretch_laws import strain_by_force
 from .tendon_chains import is_let_out, settle, turned_since
 from .tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
 from .terms import answers_of, energies_of
@@ -193,7 +192,7 @@ class Fields:
             # Moments are no function of curvatures: those of the elements themselves are told.
             strain = self._changes(member, x)
         elif section.law is not None:
-            near, axes = self._near(member, x)
+            near, axes = self.near(member, x), self.changeable(member)
             acting = np.concatenate([strain, forces], axis=1)[:, : near.shape[1]]
             strain, along = np.split(curvature_by_moment(model.scene, member, x, acting, near, axes), [3], axis=1)
         elif section.coupled and model.space:
@@ -228,17 +227,6 @@ class Fields:
         own = scaled_strains(model, self.state.y)[part] * np.sqrt(compliance / weight[..., None])
         found[:, axes] = np.einsum("np,npa->na", at.at_points, own[at.elements])
         return found
-
-    def _near(self, member: str, x: Array) -> tuple[Array, list[int]]:
-        """Changes of curvatures (n, 3), 1/m, and behind them the strains on which the law of a member's section
-        depends, as elements say at fractions x; and the numbers of those that the scene may change.
-        """
-        form, line, space = form_of(self.model.scene, member), self.model.scene.center_lines[member], self.model.space
-        count, near = 0 if form is None else form.strains, self._changes(member, x)
-        axes = [0, 1, 2] if space else [line.bending_axis - 1]
-        if count:
-            near = np.concatenate([near, self._strains(member, x)[:, :count]], axis=1)
-        return near, axes + [3 + i for i in line.strained_axes(space) if i < count]
 
     def _branches(self, member: str, x: Array) -> tuple[Array, Array]:
         """Moments (n, 3), N m, about b1, b2, b3 of what has not yet relaxed, and strains (n, 3) by such forces."""
@@ -730,7 +718,17 @@ class Fields:
         """Changes (n, 3) of twist and of the curvatures about b2 and b3, 1/m, of the elements at fractions x (n,), and
         behind them the strains on which the law of a member's section depends.
         """
-        return self._near(member, x)[0]
+        form, near = form_of(self.model.scene, member), self._changes(member, x)
+        if form is None or not form.strains:
+            return near
+        return np.concatenate([near, self._strains(member, x)[:, : form.strains]], axis=1)
+
+    def changeable(self, member: str) -> list[int]:
+        """The numbers of the entries of :meth:`near` that the scene may change."""
+        form, line, space = form_of(self.model.scene, member), self.model.scene.center_lines[member], self.model.space
+        axes = [0, 1, 2] if space else [line.bending_axis - 1]
+        count = 0 if form is None else form.strains
+        return axes + [3 + i for i in line.strained_axes(space) if i < count]
 
     def _frames(self, member: str, x: Array, rotation: Array) -> Array:
         """Section axes as columns, (n, 3, 3)."""
@@ -828,87 +826,6 @@ class Fields:
         found = f"{worst!r} by {superelements[worst]:.2g} of its length or rad, accepted: up to {LARGE:g}"
         return f"{found}, and to be accurate a few percent; make it flexible"
 
-    def beyond_laws(self) -> tuple[str, ...]:
-        """Sentences on members that bend further than the law of their section is known, or where it is not convex.
-
-        Looked for at the nodes of all elements and between them.
-        """
-        model, scene, found = self.model, self.model.scene, self._beyond_stretch_laws()
-        for name in model.members:
-            law, line = law_of(scene, name), scene.center_lines[name]
-            if law is None:
-                continue
-            section = scene.sections[str(scene.members[name].section)]
-            nodes = model.along(name)
-            x = np.sort(np.concatenate([nodes, 0.5 * (nodes[1:] + nodes[:-1])]))
-            along, form = self.along(name, x), law.form_in(section)
-            change = along["curvature"] - line.curvatures(x)
-            bent = change[:, form.about - 1] if form.about else np.hypot(change[:, 1], change[:, 2])
-            law_name = f"the law {law.type!r} of section {str(scene.members[name].section)!r}"
-            if form.strains:
-                centre = section.arms(x) if section.shifted else np.zeros((len(x), 3, 3))
-                strain = along["strain"] - np.einsum("nij,nj->ni", centre, change)
-                change = np.concatenate([change, strain[:, : form.strains]], axis=1)
-                found += _beyond_fibres(law, section, x, strain[:, 0], bent, f"{law_name} ends", name)
-            # Where the section stretches it is the strain of fibres that ends a law.
-            low, high = (np.full(len(x), end) for end in law.span) if form.strains else law.reach(section, x).T
-            over = np.maximum(bent - high, low - bent)
-            i = int(np.argmax(over))
-            if over[i] > tolerances.WRITTEN * max(abs(low[i]), abs(high[i])):
-                end = high[i] if bent[i] > high[i] else low[i]
-                found.append(
-                    f"{law_name} ends at a curvature of {end:.6g} 1/m, and member {name!r} bends by {bent[i]:.6g} 1/m "
-                    f"at {x[i]:.3g} of its length: beyond the end the law is a guess, with the slope there"
-                )
-            slack = law.slack(section, x, change)
-            i = first_of_largest(np.maximum(slack, 0.0))
-            # A gap keeps rounding from deciding.
-            if slack[i] > tolerances.ALIKE:
-                found.append(
-                    f"{law_name} has no stiffness against bending where the twist is larger than the curvature, as "
-                    f"{abs(change[i, 0]):.4g} beside {abs(change[i, 2]):.4g} 1/m in member {name!r} at {x[i]:.3g} of "
-                    "its length: many shapes have the same energy there"
-                )
-            if law.convex:
-                continue
-            least = least_stiffness(scene, name, x, change, self._near(name, x)[1])
-            i = int(np.argmin(least))
-            if least[i] < 0.0:
-                where, more = (", ".join(f"{entry:.4g}" for entry in part) for part in (change[i, :3], change[i, 3:]))
-                strained = f" and strains of ({more})" if more else ""
-                found.append(
-                    f"{law_name} is not convex at changes of the curvatures of ({where}) 1/m{strained}, as of member "
-                    f"{name!r} at {x[i]:.3g} of its length: a finer mesh may find other shapes there"
-                )
-        return tuple(found)
-
-    def _beyond_stretch_laws(self) -> list[str]:
-        """The same of the laws of stretch."""
-        model, scene, found = self.model, self.model.scene, list[str]()
-        for name in model.members:
-            law = stretch_law_of(scene, name)
-            if law is None:
-                continue
-            x, (low, high) = model.along(name), law.span
-            strain = self.along(name, x)["strain"][:, 0]
-            where = f"the law of stretch {law.type!r} of section {str(scene.members[name].section)!r}"
-            over = np.maximum(strain - high, low - strain)
-            i = first_of_largest(np.maximum(over, 0.0))
-            if over[i] > tolerances.WRITTEN * max(abs(low), abs(high)):
-                end = high if strain[i] > high else low
-                found.append(
-                    f"{where} ends at a strain of {end:.6g}, and member {name!r} has {strain[i]:.6g} at {x[i]:.3g} of "
-                    "its length: beyond the end the law is a guess, with the slope there"
-                )
-            least = np.ones(len(x)) if law.convex else least_tangent(scene, name, x, strain)
-            i = int(np.argmin(least))
-            if least[i] < -tolerances.WRITTEN:
-                found.append(
-                    f"{where} is not convex at a strain of {strain[i]:.4g}, as of member {name!r} at {x[i]:.3g} of its "
-                    "length: a finer mesh may find other shapes there"
-                )
-        return found
-
     def pulled(self, member: str) -> float:
         """Axial force of a small member with two ends over its transverse stiffness times its length (``12 EI / L^2``).
 
@@ -973,24 +890,6 @@ class Fields:
             # them.
             moments[:-1] = -self.balance.starting_moments(part) - _cross(self.turned[part, 0], strings)
         return np.asarray(moments)
-
-
-def _beyond_fibres(law: Any, section: Any, x: Array, strain: Array, bent: Array, ends: str, member: str) -> list[str]:
-    """A sentence where a fibre of a section that stretches is strained further than its law is known."""
-    form, (low, high) = law.form_in(section), law.fibre_span
-    if not np.isfinite(high):
-        return []
-    reach = section.fibres(x)[:, 2 if form.about == BOTH else form.about - 1] * np.abs(bent)
-    over = np.maximum(strain + reach - high, low - strain + reach)
-    i = first_of_largest(np.maximum(over, 0.0))
-    if not over[i] > tolerances.WRITTEN * max(abs(low), abs(high)):
-        return []
-    above = strain[i] + reach[i] - high == over[i]
-    end, there = (high, strain[i] + reach[i]) if above else (low, strain[i] - reach[i])
-    return [
-        f"{ends} at a strain of {end:.6g}, and a fibre of member {member!r} has {there:.6g} at {x[i]:.3g} of its "
-        "length: beyond the end the law is a guess, with the slope there"
-    ]
 
 
 def _summed(at: Stations, starts: Array, gained: Array) -> Array:

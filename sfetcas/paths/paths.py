@@ -9,6 +9,7 @@ bifurcations of a symmetric structure apart.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -25,7 +26,8 @@ from ..errors import SceneError, SolveError, Status
 from ..mathematics.threads import single_threaded
 from ..mechanics.accuracy import largest_difference
 from ..mechanics.displacements import Displacements
-from ..mechanics.fields import transferred
+from ..mechanics.fields import Fields, transferred
+from ..mechanics.law_limits import first_beyond_laws
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
 from ..mechanics.unilateral import Stops
@@ -226,15 +228,10 @@ class _Level:
         return sum(len(part.traced.points) for part in self.stretches) * self.curve.equations.unknowns
 
 
-def _beyond_laws(level: _Level) -> tuple[str, ...]:
-    """The first points at which members bend beyond the laws of their sections."""
-    found: dict[str, str] = {}
+def _states(level: _Level) -> Iterator[tuple[str, Fields]]:
+    """All points of a path, by what a note says of where they are."""
     for point in (point for part in level.stretches for point in part.traced.points):
-        for note in point.fields.beyond_laws():
-            found.setdefault(
-                note.partition(" 1/m")[0].partition(" at changes")[0], f"at factor {point.factor:.6g} {note}"
-            )
-    return tuple(found.values())
+        yield f"at factor {point.factor:.6g}", point.fields
 
 
 class PathTracing:
@@ -475,7 +472,7 @@ class PathTracing:
             unit=curve.unit,
             error_estimate=largest if np.isfinite(largest) else None,
             last=last,
-            notes=(*level.notes, *_beyond_laws(level), *self._means(curve)),
+            notes=(*level.notes, *first_beyond_laws(_states(level)), *self._means(curve)),
             seconds=self.seconds,
         )
 
