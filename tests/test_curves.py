@@ -174,6 +174,8 @@ def test_quantities_of_a_path_stand_over_the_factor(path):
     found = np.concatenate([line.get_ydata() for line in panel.get_lines() if line.get_linestyle() in ("-", "--")])
     # The curve goes through all points.
     assert all(np.abs(found - value).min() < 1e-12 for value in path.positions("B")[:, 1])
+    energies = np.concatenate([line.get_ydata() for line in chart(path, "energy.total").axes[0].get_lines()])
+    assert all(np.abs(energies - path.configuration(p).energy["total"]).min() < 1e-12 for p in path.points)
     several = chart(path, quantities=["nodes.B.position", "reactions.A.force.x"])
     assert [label for label in upright(several) if label.startswith(("nodes", "reactions"))] == [
         "nodes.B.position.x, m",
@@ -181,7 +183,7 @@ def test_quantities_of_a_path_stand_over_the_factor(path):
         "reactions.A.force.x, N",
     ]
     for wrong, sentence in (
-        ("energy.elastic", "which the points of a path do not tell"),
+        ("certificate.residual", "which is told of steps only"),
         ("modes.omega", "told of modes only"),
         ("nodes.C.position", "found 'C'"),
     ):

@@ -90,6 +90,8 @@ def test_points_are_what_repeated_solves_find(lee_path):
         before = solve_model(prepared, point.factor, start=before)
         # Both are polished to rounding; the frame is 120 m high.
         assert lee_path.fields(point).position("load") == pytest.approx(before.position("load"), abs=1e-9)
+        # The energy is level there.
+        assert lee_path.configuration(point).energy == pytest.approx(before.energy, rel=1e-9)
 
 
 def test_every_point_is_an_equilibrium(lee_path):
@@ -100,8 +102,7 @@ def test_every_point_is_an_equilibrium(lee_path):
 
 
 def test_energy_grows_by_the_work_of_the_load(lee_path):
-    equations, model = lee_path.prepared.equations, lee_path.model
-    energy = [equations.at(p.state, p.loading).strain * model.scales.moment for p in lee_path.points]
+    energy = [lee_path.configuration(point).energy["elastic"] for point in lee_path.points]
     sunk = -lee_path.positions("load")[:, 1]
     factors = lee_path.main.factors
     work = np.sum(0.5 * (factors[1:] + factors[:-1]) * np.diff(sunk))

@@ -307,6 +307,21 @@ class Configuration:
         """
         return answers(self.fields) if self.model.scene.contacts else {}
 
+    @functools.cached_property
+    def energy(self) -> dict[str, float]:
+        """``elastic`` energy, potential of the ``loads``, and their ``total``, N m; zero for the undeformed scene.
+
+        Where laws have memory also what they have ``dissipated``, which the total does not have.
+        """
+        elastic, loads = (part * self.model.scales.moment for part in self._energies)
+        lost = {"dissipated": sum(self.fields.dissipated.values())} if self.fields.dissipated else {}
+        return {"elastic": elastic, **lost, "loads": loads, "total": elastic + loads}
+
+    @property
+    def _energies(self) -> tuple[float, float]:
+        """Elastic energy, and potential of the loads, dimensionless."""
+        return self.fields.energies
+
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
         """The quantities of one node, member, spring, ..., under the keys of the JSON answer.
 
@@ -314,7 +329,7 @@ class Configuration:
         ----------
         kind : str
             A table of the answer: ``nodes``, ``reactions``, ``members``, ``springs``, ``tendons``, ``tubes``,
-            ``motions``, ``magnets`` or ``contacts``; empty for the quantities of the whole state.
+            ``motions``, ``magnets``, ``contacts`` or ``energy``; empty for the quantities of the whole state.
         name : str
             Name of the record.  Of a member only integral and largest values; :meth:`along` has its fields.
 
@@ -334,6 +349,7 @@ class Configuration:
             "motions": lambda: self.motion(name),
             "magnets": lambda: self.magnet(name),
             "contacts": lambda: self.contacts.get(name, {}),
+            "energy": lambda: {**self.energy, "potential": self.energy["total"]},
         }
         return tables[kind]() if kind in tables else {}
 
@@ -417,24 +433,13 @@ class Equilibrium(Configuration):
         """The first nodes that can move, and the first note, in words."""
         return [*self._moved(), *notes_in_words(self.notes)]
 
-    @functools.cached_property
-    def energy(self) -> dict[str, float]:
-        """``elastic`` energy, potential of the ``loads``, and their ``total``, N m; zero for the undeformed scene.
-
-        Where laws have memory also what they have ``dissipated``, which the total does not have.
-        """
-        unit = self.model.scales.moment
-        elastic, total = self.strain * unit, self.potential * unit
-        lost = {"dissipated": sum(self.fields.dissipated.values())} if self.fields.dissipated else {}
-        return {"elastic": elastic, **lost, "loads": total - elastic, "total": total}
+    @property
+    def _energies(self) -> tuple[float, float]:
+        return self.strain, self.potential - self.strain
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
-        """As :meth:`.Configuration.table`; also for the kinds ``energy`` and ``certificate``."""
-        if kind == "certificate":
-            return self.certificate.to_dict()
-        if kind == "energy":
-            return {**self.energy, "potential": self.energy["total"]}
-        return super().table(kind, name)
+        """As :meth:`.Configuration.table`; also for the kind ``certificate``."""
+        return self.certificate.to_dict() if kind == "certificate" else super().table(kind, name)
 
     def plot(self, *, colour: str | None = None) -> Figure:
         """The deformed structure over the undeformed one, see :func:`~sfetcas.pictures.plotting.picture`."""

@@ -353,6 +353,12 @@ class Fields:
         before = (self.model.mesh.memory or {}).values()
         return sum(self.dissipated.values()) - sum(one.dissipated for one in before)
 
+    @functools.cached_property
+    def energies(self) -> tuple[float, float]:
+        """Elastic energy, and potential of the loads since the undeformed scene, dimensionless."""
+        point = self._equations.at(self.state, self._applied)
+        return point.strain, point.potential - point.strain - self.spent / self.model.scales.moment
+
     def magnet(self, name: str) -> dict[str, Any]:
         """What the fields do to a magnet: ``energy`` (N m), ``torque`` (3,) N m and ``force`` (3,) N."""
         model, total = self.model, self._of_magnet(name).sum(axis=0)

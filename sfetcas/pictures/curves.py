@@ -46,7 +46,6 @@ __all__ = [
 
 FREQUENCIES = "modes.omega"
 """The quantity of a path with modes that its points tell beside those of equilibria."""
-NOT_ON_PATHS = ("energy", "certificate")
 COMPONENTS = ("#0072B2", "#D55E00", "#009E73", "#8F3B76")
 """Colours of x, y, z, or w, x, y, z."""
 NOWHERE = 1e-12
@@ -156,11 +155,9 @@ def quantities_named(scene: Scene, quantities: Sequence[str]) -> list[AnswerName
             raise SceneError(error.bare, ("quantities",)) from None
         if not kind.numeric or kind.table == "modes" or kind.name == "omega":
             raise SceneError(f"found {text!r}, accepted: a quantity that is a number in each state", ("quantities",))
-        if path and kind.table in NOT_ON_PATHS:
-            accepted = "a quantity of nodes, reactions, members, springs, motions or contacts"
-            raise SceneError(
-                f"found {text!r}, which the points of a path do not tell, accepted: {accepted}", ("quantities",)
-            )
+        if path and kind.table == "certificate":
+            accepted = "a quantity of the state, as 'nodes.tip.position'"
+            raise SceneError(f"found {text!r}, which is told of steps only, accepted: {accepted}", ("quantities",))
         if kind.along != (name.at is not None) or len(name.selectors) > kind.along:
             accepted = f"{name.bare} at 0.5, or another place" if kind.along else name.bare
             raise SceneError(f"found {text!r}, accepted: {accepted}", ("quantities",))
