@@ -193,7 +193,8 @@ def test_a_fold_ends_the_way_where_no_snap_is_followed():
         "tubes.t.insertion_history": "push",
     }
     with pytest.raises(
-        SolveError, match=r"at factor 3: .* not be followed beyond factor 2\.3637.*insertion 0\.7363"
+        SolveError,
+        match=r"at factor 3: .* not be followed beyond factor 2\.3637.*insertion 0\.7363.*rotation 3\.3 rad",
     ) as e:
         sfetcas.solve(sliding(**histories, **{"analysis": {"steps": [2, 3], "unstable": "stay"}}))
     assert len(e.value.reached.steps) == 1

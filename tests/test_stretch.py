@@ -561,3 +561,34 @@ def test_a_section_so_soft_that_rounding_is_all_that_is_left_is_refused(key, wor
     scene = sfetcas.load(PROBLEMS / "cantilever_stretching.toml")
     with pytest.raises(SceneError, match=f"against {words} of 1e-300 times .* accepted: at least 1e-08 times"):
         scene.replace({f"sections.strip.{key}": 1e-300})
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (
+            {},
+            "stretch and shear, which are left out, .*: stretch = true and shear = true of the section 's' count them",
+        ),
+        ({"stretch": True}, "shear, which is left out, .*: shear = true of the section 's' counts it"),
+        ({"shear": True}, "stretch, which is left out, .*: stretch = true of the section 's' counts it"),
+        ({"stretch": True, "shear": True}, None),
+        ({"nu": None}, "stretch, which is left out, .*: stretch = true of the section 's' counts it"),
+    ],
+    ids=["none", "stretch", "shear", "both", "shear modulus unknown"],
+)
+def test_what_is_left_out_is_told_where_it_matters(given, told):
+    """The estimate is near what the answer changes by where it is counted."""
+    shape = {"shape": "rectangle", "width": 0.1, "height": 0.1, "E": 1e4, "nu": 0.3, **given}
+    shape = {key: value for key, value in shape.items() if value is not None}
+    scene = Scene.from_dict(cantilever((0.05, 0.05), sections={"s": shape}, dimension="plane"))
+    found = sfetcas.solve(scene).last
+    if told is None:
+        assert not found.notes
+        return
+    (note,) = found.notes
+    assert re.match(told, note)
+    switches = {f"sections.s.{kind}": True for kind in re.findall(r"(\w+) = true", note)}
+    moved = np.linalg.norm(sfetcas.solve(scene.replace(switches)).last.position("B") - found.position("B"))
+    # An estimate of an order of magnitude, of one metre.
+    assert 0.3 < float(re.search(r"by about (\S+) of the size", note)[1]) / moved < 3.0

@@ -12,7 +12,7 @@ from ..errors import SceneError
 from .shapes import Straight
 from .tubes import Tube, check_reach
 
-__all__ = ["check_insertion", "gone_to", "inserted", "pushed", "refuse_insertion", "stops_between"]
+__all__ = ["check_insertion", "gone_to", "inserted", "pushed", "refuse_insertion", "share_of", "stops_between"]
 
 SAMPLES = 17
 """Places between two knots of histories at which it is looked at how far tubes reach."""
@@ -183,8 +183,12 @@ def _check_reaches(scene: Any) -> None:
 
 def gone_to(scene: Any, record: Any, factor: float) -> float:
     """How far a tube or a member has gone forward at a load factor, m."""
-    history = record.insertion_history
-    return float(record.insertion * (factor if history is None else scene.histories[history].factor(float(factor))))
+    return float(record.insertion * share_of(scene, record.insertion_history, factor))
+
+
+def share_of(scene: Any, history: str | None, factor: float) -> float:
+    """What multiplies an input at a load factor: its history's value there, or the factor itself."""
+    return float(factor if history is None else scene.histories[history].factor(float(factor)))
 
 
 def _direction(scene: Any, member: str) -> np.ndarray[Any, np.dtype[np.float64]]:

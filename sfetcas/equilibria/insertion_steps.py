@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..description.inserting import gone_to, inserted, pushed, stops_between
+from ..description.inserting import gone_to, inserted, pushed, share_of, stops_between
 from ..errors import SolveError, Status
 from ..mechanics.equations import State
 from ..mechanics.fields import transferred
@@ -255,12 +255,17 @@ class InsertionSteps:
         return meshes.prepared(meshes.pilot_mesh.refined())
 
     def place(self, factor: float) -> str:
-        """Where a load factor is, in words: how far the tubes and members have gone."""
+        """Where a load factor is, in words: how far the tubes and members have gone and the tubes have turned."""
         scene = self.scene
         gone = [
             f"{table}.{name}.insertion {gone_to(scene, record, factor):.7g} m" for table, name, record in pushed(scene)
         ]
-        return f"factor {factor:.7g}, {', '.join(gone)}"
+        turned = [
+            f"tubes.{name}.rotation {tube.rotation * share_of(scene, tube.history, factor):.7g} rad"
+            for name, tube in scene.tubes.items()
+            if tube.rotation
+        ]
+        return f"factor {factor:.7g}, {', '.join(gone + turned)}"
 
     def _meshes(self, factor: float) -> Meshing:
         """The meshes of the scene at a load factor."""

@@ -675,13 +675,14 @@ def strain_notes(fields: Fields) -> tuple[str, ...]:
 
     A member of length L that is pulled by N and pushed across by Q changes its ends by about ``N L / EA + Q L / GA``.
     """
-    scene, found = fields.model.scene, dict[str, float]()
+    scene, found, kinds = fields.model.scene, dict[str, float](), dict[str, list[str]]()
     for name in fields.model.members:
         record = scene.members[name]
         section = scene.sections[str(record.section)] if record.type == "flexible" else None
         # What has tubes stretches with these, by less, and cannot be asked to.
         if section is None or section.shape is None or section.stretch_law is not None or name in scene.tubed:
             continue
+        kinds[name] = ["stretch"] * (not section.stretch) + ["shear"] * (section.sheared and not section.shear)
         x = fields.model.mesh.cuts[name]
         left_out = section.replace(stretch=True, shear=section.sheared).compliance(x) - section.compliance(x)
         strains = fields.section_forces(name, x) * left_out
@@ -690,11 +691,12 @@ def strain_notes(fields: Fields) -> tuple[str, ...]:
     worst = max(found, key=lambda name: found[name], default="")
     if not worst or found[worst] <= LEFT_OUT * accuracy:
         return ()
-    name = str(scene.members[worst].section)
-    said = f"stretch and shear, which are left out, would move the ends of {worst!r} by about {found[worst]:.1g} of the"
-    asked = f"size, and an accuracy of {accuracy:g} is asked for: stretch = true"
-    more = " and shear = true" if scene.sections[name].sheared else ""
-    return (f"{said} {asked}{more} of the section {name!r} count them",)
+    what, one = " and ".join(kinds[worst]), len(kinds[worst]) == 1
+    said = f"{what}, which {'is' if one else 'are'} left out, would move the ends of {worst!r} by about"
+    asked = f"{found[worst]:.1g} of the size, and an accuracy of {accuracy:g} is asked for"
+    switches = " and ".join(f"{kind} = true" for kind in kinds[worst])
+    counted = f"{switches} of the section {str(scene.members[worst].section)!r} {'counts' if one else 'count'}"
+    return (f"{said} {asked}: {counted} {'it' if one else 'them'}",)
 
 
 def tendon_notes(fields: Fields) -> tuple[str, ...]:
