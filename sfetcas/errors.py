@@ -44,6 +44,7 @@ class Status(enum.Enum):
     INTERRUPTED = "interrupted: what was computed up to then is kept"
     ITERATIONS = "the solver used up its iterations"
     SINGULAR = "the equilibrium is singular, where derivatives do not exist"
+    KINK = "the equilibrium is at a kink, about which nothing is linear"
     UNDETERMINED = "the measurements do not determine all parameters"
     FAILED = "the solver stopped before it reached an equilibrium"
 

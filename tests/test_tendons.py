@@ -897,11 +897,6 @@ def test_pulled_too_far():
         sfetcas.solve(rod(pull=5.0))
 
 
-def test_slackness_is_not_searched_in_modes():
-    with pytest.raises(SceneError, match=r"tendons\.t: found a length that is given with the analysis 'modes'"):
-        rod(pull=0.01, analysis={"type": "modes"})
-
-
 def test_slackness_is_not_searched_with_modes_on_a_path():
     with pytest.raises(SceneError, match=r"tendons\.t: found a length that is given with modes on a path, in which no"):
         rod(pull=0.01, analysis={"type": "path", "range": [0, 1], "modes": 2})

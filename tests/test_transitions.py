@@ -398,3 +398,45 @@ def test_a_number_on_which_nothing_ever_depends_is_refused():
     table["sections"]["other"] = {"EI3": 2.0}
     with pytest.raises(SceneError, match="found a number on which nothing depends"):
         parametric(Scene.from_dict(table), ["sections.other.EI3"])
+
+
+# -- vibrations ---------------------------------------------------------------------------------------
+
+
+def frequencies(table):
+    return solve(Scene.from_dict({**table, "analysis": {"type": "modes", "modes": 3, "accuracy": 1e-7}})).omega
+
+
+@pytest.mark.parametrize("stiffness", [{}, {"stiffness": 40.0}])
+def test_vibrations_know_whether_the_string_is_taut(stiffness):
+    table = beam(0.1)
+    table["sections"]["s"]["rhoA"] = 1.0
+    string = table["tendons"]["t"] | stiffness
+    pushing, without = (table | {"tendons": tendons} for tendons in ({"t": string | {"pushes": True}}, {}))
+    np.testing.assert_allclose(frequencies(table | {"tendons": {"t": string}}), frequencies(pushing), rtol=1e-7)
+    for loose in (0.5, 1.0):
+        string = table["tendons"]["t"] | stiffness | {"length": 0.5 + loose}
+        np.testing.assert_allclose(frequencies(table | {"tendons": {"t": string}}), frequencies(without), rtol=1e-7)
+
+
+@pytest.mark.parametrize("stiffness", [{}, {"stiffness": 40.0}])
+def test_about_a_string_that_is_neither_taut_nor_slack_nothing_vibrates_linearly(stiffness):
+    table = beam(0.0)
+    table["sections"]["s"]["rhoA"] = 1.0
+    table["tendons"]["t"] |= stiffness
+    del table["loads"]
+    with pytest.raises(SolveError, match=r"tendons\.t is neither taut nor slack") as error:
+        frequencies(table)
+    assert error.value.status is Status.KINK
+
+
+def test_vibrations_at_a_stop_are_those_of_a_rod_held_there():
+    rod = lever([1.0])
+    free, held = rod | {"loads": {}}, clamped(STOP[1], 5.0).model.scene.to_dict()
+    for table, other in (
+        ({**rod, "loads": {"f": {"type": "force", "node": "B", "value": [0, 5.0]}}}, held),
+        (free, {**free, "springs": {"k": {"node": "A", "stiffness": 2.0}}}),
+    ):
+        for scene in (table, other):
+            scene["sections"] = {name: {**section, "rhoA": 1.0} for name, section in scene["sections"].items()}
+        np.testing.assert_allclose(frequencies(table), frequencies(other), rtol=1e-7)

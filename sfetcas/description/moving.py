@@ -43,7 +43,7 @@ def check_masses(
 
 
 def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], springs: Mapping[str, Spring]) -> None:
-    """Refuse contacts, which vibrations and motions cannot treat, and stops, which vibrations cannot.
+    """Refuse contacts, which vibrations and motions cannot treat, and stops, which vibrations along paths cannot.
 
     Raises
     ------
@@ -55,8 +55,8 @@ def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], spring
         message = f"found an obstacle with {given}, accepted: with 'static', or 'path' without modes"
         raise SceneError(message, ("contacts", name))
     for name, spring in springs.items():
-        if spring.stop is not None and analysis.type != "dynamic":
-            message = f"found a stop with {given}, accepted: with 'static' or 'dynamic'"
+        if spring.stop is not None and analysis.type == "path":
+            message = f"found a stop with {given}, accepted: with 'static', 'modes', 'dynamic', or 'path' without modes"
             raise SceneError(message, ("springs", name, "stop"))
 
 

@@ -527,10 +527,10 @@ def _check_tendons(scene: Scene) -> None:
             if way.member is not None and not way.holes and scene.members[way.member].branches(scene.sections):
                 found = f"found the member {way.member!r}, whose section relaxes"
                 raise SceneError(f"{found}, accepted: discs, or a member that does not", ("tendons", name))
-        if tendon.may_be_slack and scene.analysis.count_of_modes:
-            what = "modes on a path" if scene.analysis.type == "path" else f"the analysis {scene.analysis.type!r}"
-            message = f"found a length that is given with {what}, in which no tendon becomes slack, accepted: pushes ="
-            raise SceneError(f"{message} true, with which it is kept as long, or a stiffness", ("tendons", name))
+        if tendon.may_be_slack and scene.analysis.type == "path" and scene.analysis.count_of_modes:
+            message = "found a length that is given with modes on a path, in which no tendon becomes slack, accepted:"
+            more = "pushes = true, with which it is kept as long, a stiffness, or type = 'modes'"
+            raise SceneError(f"{message} {more}", ("tendons", name))
 
 
 def _check_tubes(scene: Scene) -> None:

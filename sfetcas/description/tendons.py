@@ -245,6 +245,11 @@ class Tendon(Record):
         return self.measured and self.stiffness is None and not self.pushes
 
     @property
+    def elastic_string(self) -> bool:
+        """Whether it is elastic and does not push, so that its stiffness ends where it becomes slack."""
+        return self.stiffness is not None and not self.pushes
+
+    @property
     def force(self) -> Any:
         """Tension at factor 1, N, below zero where a chamber pushes; of one whose force is given."""
         return self.tension if self.pressure is None else -1.0 * self.pressure * numbers(self.area)

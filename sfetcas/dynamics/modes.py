@@ -28,6 +28,7 @@ from ..equilibria.meshing import Meshing
 from ..equilibria.settings import Settings
 from ..equilibria.single import finished
 from ..equilibria.solution import Equilibrium, heading, heading_in_words
+from ..equilibria.stops import solve_stopped
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import TINY, Array, first_of_largest
 from ..mathematics.linear import SparseSolver, smallest
@@ -36,6 +37,7 @@ from ..mechanics.displacements import STEP, Displacements
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import transferred
 from ..mechanics.loading import Loading
+from ..mechanics.margins import undecided
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
 from ..solvers.prepared import Prepared, Solved
@@ -303,20 +305,23 @@ class ModalAnalysis:
         scene = self.scene
         sprung = any(spring.rest or spring.length is not None for spring in scene.springs.values())
         everywhere = scene.gravity is not None or scene.rotating is not None
-        if not any(scene.driven) and not everywhere and not sprung:
+        strung = scene.stopped or any(tendon.elastic_string for tendon in scene.tendons.values())
+        if not any(scene.driven) and not everywhere and not sprung and not strung:
             return None
         check_floating(
             scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension, scene.tendons
         )
-        found = statics.solve(scene, self.settings)
+        found = (solve_stopped if scene.stopped else statics.solve)(scene, self.settings)
         self.seconds = dict(found.seconds)
+        for what in undecided(found.last.fields):
+            raise SolveError(Status.KINK, f"{what}, so that no vibration is", found.last.state)
         return found.last
 
     def _mesh(self) -> Mesh:
         named = self.settings.element or any(member.element for member in self.scene.members.values())
         mesh = self.meshing.target
         if self.rest is not None:
-            mesh = replace(mesh, cuts=self.rest.model.mesh.cuts)
+            mesh = replace(mesh, cuts=self.rest.model.mesh.cuts, stops=self.rest.model.mesh.stops)
         return replace(mesh, order=mesh.order if named else ORDER, places=True)
 
     def modes(self) -> Modes:
@@ -364,7 +369,8 @@ class ModalAnalysis:
 
     def _buckling(self, prepared: Prepared) -> Array:
         """Buckling factors, none where the structure cannot be unloaded."""
-        if self.rest is None or not prepared.model.conservative:
+        # Without its loads other strings may be slack.
+        if self.rest is None or not prepared.model.conservative or self.scene.stopped:
             return np.zeros(0)
         try:
             return buckling_factors(prepared, self.count)

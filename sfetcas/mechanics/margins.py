@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from .fields import Fields
 from .unilateral import Unilateral, unilaterals
 
-__all__ = ["ROUNDING", "margins"]
+__all__ = ["ROUNDING", "margins", "undecided"]
 
 ROUNDING = 1e-12
 """Of margins: what has next to nothing to do stays as it is."""
@@ -33,3 +33,18 @@ def margins(fields: Fields) -> Mapping[Unilateral, float]:
             left = limits[1] - state.travel if high else state.travel - limits[0]
             found[one] = left / (1.0 if state.rotational else scales.length)
     return found
+
+
+UNDECIDED = 1e-6
+"""Margins below which neither side is linear: vibrations as small as those that are seen would cross over."""
+
+
+def undecided(fields: Fields) -> Iterator[str]:
+    """Names of what is neither active nor inactive at a state, as sentences; elastic strings among them."""
+    yield from (one.undecided for one, margin in margins(fields).items() if margin < UNDECIDED)
+    scene, scales = fields.model.scene, fields.model.scales
+    for name, tendon in scene.tendons.items():
+        if tendon.elastic_string:
+            taut = fields.tendon(name)["tension"] / scales.force
+            if max(taut, -fields.balance.elongation(name) / scales.length) < UNDECIDED:
+                yield Unilateral("tendons", name, "slack").undecided

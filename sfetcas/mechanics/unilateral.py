@@ -60,6 +60,13 @@ class Unilateral:
             return f"{self.table}.{self.name} {'taut' if self.active(stops) else 'slack'}"
         return f"{self.table}.{self.name} {'at' if self.active(stops) else 'off'} its {self.side} stop"
 
+    @property
+    def undecided(self) -> str:
+        """What it is in a sentence where its margin is zero: ``tendons.cable is neither taut nor slack``."""
+        if self.side == "slack":
+            return f"{self.table}.{self.name} is neither taut nor slack"
+        return f"{self.table}.{self.name} touches its {self.side} stop without a force"
+
 
 def unilaterals(scene: Scene) -> tuple[Unilateral, ...]:
     """The unilateral constraints of a scene: tendons first, in its order."""

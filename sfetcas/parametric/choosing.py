@@ -158,7 +158,7 @@ class Choosing:
         for one, margin in self.margins(solver, numbers, flat).items():
             if margin <= STRICT:
                 detail = f"{one.becomes(stops)} there, and derivatives differ to either side"
-                raise SolveError(Status.SINGULAR, detail)
+                raise SolveError(Status.KINK, detail)
 
 
 def _row(one: Unilateral) -> str:
