@@ -391,6 +391,18 @@ def test_errors_are_told():
         assert error < one.certificate.error_estimate <= 1e-4
 
 
+def test_errors_of_motions_are_told():
+    """Fronts leave no order by which the difference of two runs could be divided."""
+    law, section = {"type": "elastic-plastic", "moment": 0.4, "ratio": 0.1}, {"EI3": 1.0, "rhoA": 1.0}
+    table = scene(law, force([0, 1.0], history="h"), section, histories={"h": {"t": [0, 0.5, 1.5], "value": [0, 1, 0]}})
+    coarse, fine = (
+        sfetcas.solve(table.replace(analysis={"type": "dynamic", "end": 1.0, "output": 0.25, "accuracy": accuracy}))
+        for accuracy in (3e-3, 3e-4)
+    )
+    error = max(np.abs(a.position("B") - b.position("B")).max() for a, b in zip(coarse.steps, fine.steps, strict=True))
+    assert error < coarse.error_estimate < 3e-3
+
+
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [

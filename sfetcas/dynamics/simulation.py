@@ -318,7 +318,8 @@ class Simulation:
                 break
             before = apart
             apart, run = self._difference(run, finer), finer
-            error = left(apart, before, self.accuracy)
+            # Fronts that cross elements, and instants of yield within steps, leave no order by which errors fall.
+            error = apart if self.scene.remembers else left(apart, before, self.accuracy)
             if error <= self.accuracy:
                 break
         if error is not None and apart is not None and error > max(self.accuracy, apart):
