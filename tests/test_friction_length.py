@@ -386,8 +386,18 @@ def test_the_report_tells_both_ends(tmp_path, capsys):
 
 def test_refused():
     swings = {"h": {"t": [0, 1, 2], "value": [0, 1, 0], "interpolation": "spline"}}
+    rises = {"h": {"t": [0, 2], "value": [0, 1]}}
     scene = rod(pull=0.02, pushes=True, friction=MU).replace({"histories": swings, "tendons.t.history": "h"})
     with pytest.raises(SceneError, match=r"found a pull that rises and falls, near the time 1, where friction would"):
         scene.replace(analysis={"type": "dynamic", "end": 2.0})
+    slack = rod(pull=0.02, friction=MU)
+    with pytest.raises(
+        SceneError, match=r"tendons\.t\.friction: found with a given length in a motion, .*: pushes = true"
+    ):
+        slack.replace({"tendons.t.history": "h", "histories": rises, "analysis": {"type": "dynamic", "end": 2.0}})
+    with pytest.raises(
+        SceneError, match=r"tendons\.t: whether a tendon is slack .* without friction, accepted: pushes"
+    ):
+        sfetcas.parametric(slack, ["tendons.t.pull"], ["nodes.B.position"])
     with pytest.raises(SceneError, match=r"tendons\.t\.friction: found with modes, in which it would slide to and fro"):
         rod(pull=0.02, pushes=True, friction=MU, analysis={"type": "modes"})

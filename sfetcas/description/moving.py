@@ -61,13 +61,17 @@ def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], spring
 
 
 def check_unilateral(analysis: Analysis, springs: Mapping[str, Spring], tendons: Mapping[str, Tendon]) -> None:
-    """Refuse stops and slack tendons with integrators that do not find when they act.
+    """Refuse stops and slack tendons with integrators that do not find when they act, or where friction hides it.
 
     Raises
     ------
     SceneError
         Names the first of them.
     """
+    for name, tendon in tendons.items():
+        if tendon.may_be_slack and tendon.friction is not None:
+            message = "found with a given length in a motion, which does not find when what slides is slack, accepted:"
+            raise SceneError(f"{message} pushes = true, or a stiffness", ("tendons", name, "friction"))
     if analysis.integrator not in ("idas", "conserving"):
         return
     found = f"found with the integrator {analysis.integrator!r}, which does not find when"

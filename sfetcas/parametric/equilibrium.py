@@ -245,7 +245,8 @@ def refuse_search(scene: Scene, lacking: str = "not exported", *, stopped: bool 
             message = f"which stops act is found by a search that is {lacking}, {instead}"
             raise SceneError(message, ("springs", name, "stop"))
     for name, tendon in scene.tendons.items():
-        if tendon.may_be_slack and not stopped:
+        if tendon.may_be_slack and (not stopped or tendon.friction is not None):
+            lacking = "without friction" if stopped else lacking
             message = f"whether a tendon is slack is found by a search that is {lacking}, accepted: pushes = true, with"
             raise SceneError(f"{message} which it is kept as long as given, or a stiffness", ("tendons", name))
     if scene.rotating is not None:
