@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scenes import ZOO
+from scenes import ZOO, cantilever
 
 from sfetcas import Scene, SceneError, SolveError, Status, check, dump, load, solve, solve_model, switch
 from sfetcas.cli import main
@@ -384,25 +384,52 @@ def test_end_twist_buckles_where_greenhill_says():
     assert bend.factor == pytest.approx(11.9824252210908, rel=1e-6)
 
 
-def test_derivative_by_the_factor_is_that_of_the_equations():
-    for found in (table("twisted_rod_clamped", range=[0, 13]), lee(), with_history()):
-        scene = made(found)
-        curve, start = curve_of(scene)
-        rng = np.random.default_rng(1)
-        state = curve.equations.moved(start.state, 0.1 * rng.standard_normal(curve.equations.total))
-        state = replace(state, lam=rng.standard_normal(len(state.lam)))
-        factor, h = 0.4, 1e-4
+def moved(**more):
+    """A cantilever whose support moves, with what is fixed to that too."""
+    found = cantilever((0.3, 1.2), analysis={"type": "path", "range": [0, 1]}, **more)
+    return found | {"motions": {"up": {"node": "A", "displacement": [0, 0.3]}}}
 
-        def residual(at, state=state, curve=curve):
-            loading = curve.model.loading(at)
-            return curve.equations.at(curve.equations.holding(state, loading), loading).residual
 
-        point = curve.equations.at(curve.equations.holding(state, curve.loading(factor)), curve.loading(factor))
-        numeric = (residual(factor + h) - residual(factor - h)) / (2.0 * h)
-        exact = curve.slope(state, factor, point)
-        assert np.abs(exact).max() > 0.1
-        # Central differences: h^2 and rounding over h.
-        assert exact == pytest.approx(numeric, abs=2e-7 * np.abs(exact).max())
+STRUNG = {
+    "spring": moved(springs={"k": {"type": "translational", "node": "B", "to": "A", "stiffness": 3.0, "length": 0.4}}),
+    "string": moved(tendons={"t": {"way": [{"node": "A", "offset": [0, 0.2]}, {"node": "B"}], "tension": 1.0}}),
+    "friction": moved(
+        tendons={"t": {"way": [{"member": "m", "offset": -0.05, "discs": 3}], "tension": 1.0, "friction": 0.3}}
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    "found",
+    [table("twisted_rod_clamped", range=[0, 13]), lee(), None, *STRUNG.values()],
+    ids=["rod", "lee", "history", *STRUNG],
+)
+def test_derivative_by_the_factor_is_that_of_the_equations(found):
+    scene = made(with_history() if found is None else found)
+    curve, start = curve_of(scene)
+    rng = np.random.default_rng(1)
+    state = curve.equations.moved(start.state, 0.1 * rng.standard_normal(curve.equations.total))
+    state = replace(state, lam=rng.standard_normal(len(state.lam)))
+    factor, h = 0.4, 1e-4
+
+    def residual(at):
+        loading = curve.model.loading(at)
+        return curve.equations.at(curve.equations.holding(state, loading), loading).residual
+
+    point = curve.equations.at(curve.equations.holding(state, curve.loading(factor)), curve.loading(factor))
+    numeric = (residual(factor + h) - residual(factor - h)) / (2.0 * h)
+    exact = curve.slope(state, factor, point)
+    assert np.abs(exact).max() > 0.1
+    # Central differences: h^2 and rounding over h.
+    assert exact == pytest.approx(numeric, abs=2e-7 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("found", STRUNG.values(), ids=STRUNG)
+def test_what_is_fixed_to_a_moved_support_shortens_no_steps(found):
+    path = solve(made(found))
+    assert path.main.factors[-1] == pytest.approx(1.0)
+    # Of the usual length.
+    assert len(path.points) < 50
 
 
 def with_history():

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import tolerances
-from ..mathematics.arrays import TINY, Array
+from ..mathematics.arrays import TINY, Array, Index
 from ..mechanics.equations import Point, State
 from ..mechanics.loading import Loading
 from ..mechanics.memory import Remembering
@@ -51,7 +51,7 @@ SHORT = 0.01
 """Corrections shorter than this, rad, need not shrink: beside a bifurcation the first ones wander along its mode."""
 
 FIXED_STEP = 1e-3
-"""Change of prescribed rotations, rad, in differences of the equations by the factor: of fourth order, so 1e-13."""
+"""Change of what is prescribed, rad or dimensionless, in differences of the equations: of fourth order, so 1e-13."""
 
 STARTS, BEHIND = 60, 10.0
 """Starts of Newton's method beside a corner of the curve; times farther than ahead a point behind it is looked for."""
@@ -226,7 +226,8 @@ class Curve:
     def slope(self, state: State, factor: float, point: Point) -> Array:
         """Derivative (total,) of the residual by the factor at a state, dimensionless.
 
-        Exact but for prescribed rotations, which enter by central differences of fourth order.
+        Exact but for prescribed rotations, and displacements of places to which more than members is fixed, which
+        enter by central differences of fourth order.
         """
         rate = self.rate(factor)
 
@@ -234,19 +235,32 @@ class Curve:
             there = self.loading(factor).plus(rate.scaled(w))
             return self.equations.at(self.equations.holding(state, there), there).residual
 
-        turning, nodal = self._steady if self._linear else _kind(rate)
-        if turning == 0.0 and nodal:
+        moved, nodal = self._steady if self._linear else self._kind(rate)
+        if moved == 0.0 and nodal:
             return self.equations.slope(state, point, rate)
-        if turning == 0.0:
+        if moved == 0.0:
             return np.asarray((residual(self.unit) - point.residual) / self.unit)
-        h = min(self.unit, FIXED_STEP / turning)
+        h = min(self.unit, FIXED_STEP / moved)
         a, b = ((residual(w) - residual(-w)) / (2.0 * w) for w in (h, 2.0 * h))
         return np.asarray((4.0 * a - b) / 3.0)
 
     @functools.cached_property
     def _steady(self) -> tuple[float, bool]:
-        """What :func:`_kind` says where no history changes it."""
-        return _kind(self.model.groups[None])
+        """What :meth:`_kind` says where no history changes it."""
+        return self._kind(self.model.groups[None])
+
+    def _kind(self, rate: Loading) -> tuple[float, bool]:
+        """Largest rate of what is prescribed in which the equations are not linear, and whether loads and motions act
+        on nodes only.
+        """
+        shifts = rate.shift.reshape(-1, self.model.element.axes)[self._seen]
+        return max(float(np.abs(part).max(initial=0.0)) for part in (rate.turn, shifts, rate.driven)), rate.nodal
+
+    @functools.cached_property
+    def _seen(self) -> Index:
+        """Numbers of the places whose displacements terms other than elements see, as springs and strings do."""
+        seen = [group.places.ravel() for group in self.model.connections]
+        return np.unique(np.concatenate([np.zeros(0, np.intp), *seen]))
 
     # -- points ---------------------------------------------------------------------------------
 
@@ -478,8 +492,3 @@ class _Across:
         """Whether an intermediate point is accurate enough; its gaps must be closed too, as small ones move much."""
         gaps = float(np.abs(here.point.residual[self.equations.unknowns :]).max(initial=0.0))
         return not self.sharp and here.residual <= PASSING and gaps <= tolerances.CONVERGED
-
-
-def _kind(rate: Loading) -> tuple[float, bool]:
-    """Largest rate of prescribed angles and travels, and whether loads and motions act on nodes only."""
-    return max(float(np.abs(rate.turn).max(initial=0.0)), rate.driven), rate.nodal
