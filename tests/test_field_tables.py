@@ -187,3 +187,8 @@ def test_what_does_not_know_tables(tmp_path):
         sfetcas.export(strip(given()), tmp_path / "c", name="c", derivatives=True)
     with pytest.raises(SceneError, match=r"fields\.f: found a table, with which no design knows where it ends"):
         sfetcas.find(strip(given()), {"factor": (0.1, 2.0)}, {"nodes.B.position.y": -0.08})
+    for name in ("fields.f.table.Bx", "fields.f.table.Bx.3"):
+        with pytest.raises(
+            SceneError, match=r"table\.Bx: found a number that varies, accepted: numbers, as tables have"
+        ):
+            sfetcas.parametric(strip(given()), [name], ["nodes.B.position"])

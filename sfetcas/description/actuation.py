@@ -188,6 +188,8 @@ class MagneticField(Record):
         try:
             with np.errstate(all="ignore"):
                 found = np.array(self.by_place(place), dtype=float).ravel()
+        except SceneError as error:
+            raise error.within("table") from None
         except (TypeError, ValueError, AttributeError, IndexError, ArithmeticError, NotImplementedError) as error:
             message = f"found a function that fails ({error}), accepted: {FUNCTION}"
             raise SceneError(message, ("function",)) from None

@@ -56,10 +56,9 @@ class FieldTable(Record):
 
     @model_validator(mode="after")
     def _check(self) -> FieldTable:
+        self._refuse_parameters()
         for key in ("x", "y", "z", "Bx", "By", "Bz"):
             column = getattr(self, key)
-            if any(hasattr(entry, "expression") for entry in (column, *(column or ()))):
-                raise SceneError("found a number that varies, accepted: numbers, as tables have no parameters", (key,))
             if column is not None and len(column) != len(self.x):
                 raise SceneError(f"found {counted(len(column), 'number')}, accepted: {len(self.x)}, as of x", (key,))
         for name, places in self.grid.items():
@@ -81,6 +80,12 @@ class FieldTable(Record):
             message = f"found {len(points)} points, which are no whole grid of {sizes} places along"
             raise SceneError(f"{message} {enumerated(tuple(self.grid))}, accepted: one point for each of {wanted}")
         return self
+
+    def _refuse_parameters(self) -> None:
+        for key in ("x", "y", "z", "Bx", "By", "Bz"):
+            column = getattr(self, key)
+            if any(hasattr(entry, "expression") for entry in (column, *(column or ()))):
+                raise SceneError("found a number that varies, accepted: numbers, as tables have no parameters", (key,))
 
     @cached_property
     def grid(self) -> Mapping[str, NDArray[np.float64]]:
@@ -110,6 +115,7 @@ class FieldTable(Record):
         # A scene by itself needs no CasADi.
         from ..mathematics.splines import GridSpline
 
+        self._refuse_parameters()
         order = np.lexsort([getattr(self, name) for name in self.grid])
         return GridSpline(list(self.grid.values()), self._values[order])
 

@@ -136,9 +136,9 @@ class Analysis(Record):
         rad, all others over the quantity itself (along members over the largest there).
     steps : (n,)
         Load factors.  Each multiplies all loads, gravity and motions without a history, and gives an answer;
-        histories are evaluated there.  Each is loaded from zero by itself, but with laws that have memory and with
-        friction of tendons they are a way from one to the next.  On a path each crossing of one of these factors is
-        an answer, in the order in which they are met.
+        histories are evaluated there.  Each is loaded from zero by itself, but with laws that have memory, with
+        friction of tendons and with insertion they are a way from one to the next.  On a path each crossing of one
+        of these factors is an answer, in the order in which they are met.
     unstable : text
         ``leave`` an unstable equilibrium for a stable one, or ``stay``.
     equilibria : text

@@ -180,7 +180,8 @@ class Tendon(Record):
     pull : m
         Shortening of its free length.
     length : m
-        Its free length at the factor 1 instead of its shortening.  Default: that of its way in the undeformed scene.
+        Its free length at the factor 1 instead of its shortening: without a ``history`` it goes there with the factor
+        from that of its way in the undeformed scene, which it is by default.  Default: that of its way.
     stiffness : N/m
         Of a tendon of given length.  Default: it does not stretch.
     pushes : boolean
