@@ -299,12 +299,9 @@ def test_obstacles_are_refused(kind):
     assert made({**of_type(kind), "springs/k": {"node": "A", "stiffness": 1.0}})
 
 
-def test_stops_are_refused_in_modes():
-    refused(
-        {**of_type("modes"), **STOPPED},
-        "springs.k.stop: found a stop with analysis.type = 'modes', accepted: with 'static' or 'dynamic'",
-    )
-    assert made({**of_type("dynamic"), **STOPPED})
+@pytest.mark.parametrize("kind", ["modes", "dynamic"])
+def test_stops_are_accepted(kind):
+    assert made({**of_type(kind), **STOPPED})
 
 
 def test_structures_may_float_where_no_equilibrium_is_asked_for():
