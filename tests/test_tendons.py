@@ -861,8 +861,9 @@ def test_picture():
     [
         ({"way": [{"node": "C"}, {"node": "B"}], "tension": 1.0}, "tendons.t.way.0.node: found 'C', accepted: A, B"),
         ({"way": [{"member": "n"}], "tension": 1.0}, "tendons.t.way.0.member: found 'n', accepted: m"),
-        ({"way": [{"node": "A"}], "tension": 1.0}, "tendons.t.way: found 1 place"),
-        ({"way": [], "tension": 1.0}, "tendons.t.way: found 0 place"),
+        ({"way": [{"node": "A"}], "tension": 1.0}, "tendons.t.way: found a way without length"),
+        ({"way": [{"node": "A"}, {"node": "A"}], "tension": 1.0}, "tendons.t.way: found a way without length"),
+        ({"way": [], "tension": 1.0}, "tendons.t.way: found a way without length"),
         ({"way": [{"node": "A"}, {"ground": [0, 0]}], "tension": 1.0}, "piece without length at"),
         ({"way": [{"member": "m"}], "tension": -1.0}, "tendons.t.tension: found -1.0, accepted: zero or"),
         (

@@ -504,7 +504,7 @@ def _check_tendons(scene: Scene) -> None:
         _known(tendon.history, scene.histories, "histories", "tendons", name, "history")
         try:
             check_way(tendon, scene.nodes, scene.members)
-            check_pieces(scene.tendon_pieces[name], len(tendon.way), scene.center_lines)
+            check_pieces(scene.tendon_pieces[name], scene.center_lines)
         except SceneError as error:
             raise error.within("tendons", name) from None
         if tendon.rubs:

@@ -433,8 +433,8 @@ def check_way(tendon: Tendon, nodes: Mapping[str, Node], members: Mapping[str, M
             )
 
 
-def check_pieces(pieces: Sequence[Piece], places: int, lines: Mapping[str, CenterLine]) -> None:
-    """Refuse a way without length, of so many ``places``, and one that runs backwards.
+def check_pieces(pieces: Sequence[Piece], lines: Mapping[str, CenterLine]) -> None:
+    """Refuse a way without length, and one that runs backwards.
 
     Raises
     ------
@@ -442,7 +442,9 @@ def check_pieces(pieces: Sequence[Piece], places: int, lines: Mapping[str, Cente
         Its place begins with ``way``.
     """
     if not pieces:
-        raise SceneError(f"found {places} place, accepted: a way with a length, from place to place", ("way",))
+        raise SceneError(
+            "found a way without length, accepted: two places that are apart, or a part of a member", ("way",)
+        )
     size = max(line.length for line in lines.values())
     for piece in pieces:
         if isinstance(piece, tuple) and _apart(*piece) <= NEAR * size:
