@@ -124,7 +124,7 @@ def test_what_ffmpeg_says_where_it_fails_is_told(tmp_path, monkeypatch, caplog):
     program.chmod(0o755)
     monkeypatch.setitem(matplotlib.rcParams, "animation.ffmpeg_path", str(program))
     with pytest.raises(SceneError, match=r"^the program ffmpeg failed: No space left$"):
-        save_animation(made(ENDED), tmp_path / "out.mp4")
+        save_animation(made(STEPS), tmp_path / "out.mp4")
     assert caplog.text == ""
 
 
@@ -132,7 +132,7 @@ def test_what_ffmpeg_says_where_it_fails_is_told(tmp_path, monkeypatch, caplog):
 def test_where_a_disk_is_full_it_is_said(tmp_path, ending):
     resource = pytest.importorskip("resource")
     path, limits = tmp_path / f"a{ending}", resource.getrlimit(resource.RLIMIT_FSIZE)
-    answer = made(ENDED) if ending == ".gif" else None
+    answer = made(STEPS) if ending == ".gif" else None
     resource.setrlimit(resource.RLIMIT_FSIZE, (200, limits[1]))
     try:
         with pytest.raises(OSError, match="File too large"):
