@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from .description.laws import StressStrain as StressStrain
     from .description.laws import Superelastic as Superelastic
     from .description.relaxation import Relaxation as Relaxation
+    from .description.rings import Ring as Ring
     from .description.scene import Analysis as Analysis
     from .description.scene import Expect as Expect
     from .description.scene import History as History
@@ -167,6 +168,7 @@ _PUBLIC = {
     "description.formulas": "Formula",
     "description.sections": "CrossSection Polynomial Table",
     "description.shapes": "Arc Curvature Helix Spline Straight",
+    "description.rings": "Ring",
     "description.springs": "Spring",
     "description.stretch_laws": "StretchBilinear StretchPotential StretchTable",
     "description.tendons": "Coil Tendon Way",

@@ -6,7 +6,7 @@ import enum
 
 from .quoting import printable
 
-__all__ = ["SceneError", "SolveError", "Status"]
+__all__ = ["LIMITS", "SceneError", "SolveError", "Status"]
 
 
 class SceneError(ValueError):
@@ -39,6 +39,7 @@ class Status(enum.Enum):
     STRETCHED = "no finite force holds the members"
     BENT = "a small member bends beyond linear elasticity"
     OUTSIDE = "a magnet leaves the table of its field"
+    SLID = "a member slides out of a ring"
     UNBOUNDED = "the loads are not held: the energy falls without bound"
     STOPPED = "the motion could not be followed further"
     INTERRUPTED = "interrupted: what was computed up to then is kept"
@@ -47,6 +48,10 @@ class Status(enum.Enum):
     KINK = "the equilibrium is at a kink, about which nothing is linear"
     UNDETERMINED = "the measurements do not determine all parameters"
     FAILED = "the solver stopped before it reached an equilibrium"
+
+
+LIMITS = (Status.BENT, Status.OUTSIDE, Status.SLID)
+"""Why a state is beyond what its scene describes."""
 
 
 class SolveError(RuntimeError):

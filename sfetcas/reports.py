@@ -263,6 +263,11 @@ def _report_step(step: Equilibrium, place: str, said: set[str]) -> None:
             for key, unit in (("torque", "N m"), ("angle", "rad"))
         )
         print(f"  tube {name}: {', '.join(texts)}")
+    for name in step.model.scene.rings:
+        state = step.ring(name)
+        told = [f"at {_number(state['at'], 1.0)}", f"force {_vector(state['force'], sizes['N'])} N"]
+        told += [f"drive {_number(state['drive'], sizes['N'])} N"] if "drive" in state else []
+        print(f"  ring {name}: {', '.join(told)}")
     for name in step.model.scene.motions:
         efforts = step.motion(name)
         units = {key: answer_name(f"motions.{name}.{key}").kind.unit for key in efforts}

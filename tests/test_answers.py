@@ -235,9 +235,13 @@ def test_expressions_say_what_answers_say():
     )
     tube = {"members": "m", "section": "s", "start": -0.1, "length": 0.6, "curvature": 0.5, "angle": 0.7}
     sheath = beam(square, loads=force, tubes={"t": tube})
+    eyelet = {"position": [1, 0, 0], "support": "clamped"}
+    ringed = beam({**square, "stretch": True}, loads=force).to_dict()
+    ringed |= {"rings": {"r": {"node": "R", "member": "m", "at": 0.5, "travel": -0.01}}}
+    ringed = Scene.from_dict({**ringed, "nodes": {**ringed["nodes"], "R": eyelet}})
     met = set()
     yielding = beam({**square, "stretch": True, "shear": True}, loads=force)
-    for scene in (frame(), rod, yielding, driven("plane"), driven("space"), sheath):
+    for scene in (frame(), rod, yielding, driven("plane"), driven("space"), sheath, ringed):
         names = []
         for kind in (kind for kind in ANSWERS if {"statics", "parameters"} <= set(kind.where)):
             table = {"reactions": "nodes"}.get(kind.table, kind.table)

@@ -118,6 +118,12 @@ def every_kind():
         {**clamped, "tendons": {"t": {"way": [{"member": "m", "offset": 0.1}], "pull": 0.01}}},
         {**clamped, "tendons": {"t": {"way": [{"member": "m", "offset": 0.1}], "tension": 0.1, "friction": 0.2}}},
         {**clamped, "sections": tubed, "tubes": {"t": {"members": "m", "section": "s", "length": 0.5}}, "loads": force},
+        {
+            **clamped,
+            "nodes": {**clamped["nodes"], "R": {"position": [0.5, 0], "support": "ball"}},
+            "rings": {"r": {"node": "R", "member": "m", "travel": 0.1}},
+            "loads": force,
+        },
         {**clamped, "fields": {"B": {"value": [0, 1]}}, "magnets": {"end": {"node": "B", "moment": [1, 0]}}},
     ):
         yield solve(Scene.from_dict(table)).last
@@ -142,5 +148,5 @@ def test_all_that_an_answer_tells_has_a_name_by_which_it_is_found():
     assert met == {kind.name for kind in ANSWERS if "statics" in kind.where} - others
 
 
-LATER = ("springs", "tendons", "tubes", "motions", "magnets", "contacts")
+LATER = ("springs", "tendons", "tubes", "rings", "motions", "magnets", "contacts")
 """Tables of a scene whose names are those of the answer."""

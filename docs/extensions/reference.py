@@ -53,6 +53,7 @@ TABLES = {
     "Way": ("Tendons: way", "`way = [{ ... }, ...]` of a tendon: its parts in their order"),
     "Coil": ("Tendons: helix", "`helix = { ... }` of a part of the way of a tendon"),
     "Tube": ("Tubes", "`[tubes.NAME]`: tubes that share the centre line of members"),
+    "Ring": ("Rings", "`[rings.NAME]`: nodes that slide along members"),
     "Load": ("Loads", "`[loads.NAME]`"),
     "Motion": ("Motions", "`[motions.NAME]`: prescribed displacements and rotations"),
     "Actuation": ("Actuations", "`[actuations.NAME]`: natural curvature and twist of members"),

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..description.scene import Scene
-from ..errors import SolveError, Status
+from ..errors import SolveError
 from ..mechanics.mesh import Mesh, Touch
 from ..solvers.continuation import NARROW
 from ..solvers.prepared import Prepared
@@ -210,9 +210,9 @@ class Toucher:
             elif sudden:
                 self.snapped.append(trial)
             assert there is not None
-            message = there.touched.fields.too_large()
-            if message:
-                raise SolveError(Status.BENT, message)
+            beyond = there.touched.fields.beyond_limits()
+            if beyond is not None:
+                raise beyond
             jumped = falls or trial in self.snapped or now is None
             rate = np.inf if jumped else turned / (trial - done)
             since = None if jumped or now is None else (done, now)

@@ -166,6 +166,9 @@ tubes.NAME.energy | J | | statics, motion, parameters | strain energy of the tub
 tubes.NAME.turn at | rad | | statics, motion | against the section there, counting turns
 tubes.NAME.curvature at | 1/m | b1 b2 b3 | statics, motion | its own twist (b1) and curvatures about its own axes
 tubes.NAME.moment at | N m | b1 b2 b3 | statics, motion | its own torque (b1) and bending moments about its own axes
+rings.NAME.at | | | all | fraction of the length of its member
+rings.NAME.force | N | x y z | all | of the ring on its member
+rings.NAME.drive | N | | all | of what moves one with a `travel`, towards the second node of the member
 motions.NAME.moment | N m | x y z | statics, motion, parameters | what makes a rotation; a number where that is one
 motions.NAME.force | N | x y z | statics, motion, parameters | what makes a displacement; a number at a driven joint
 magnets.NAME.energy | J | | statics, motion, parameters | minus the moment times the field, summed along members
@@ -222,6 +225,7 @@ APPLIES: dict[str, Callable[[Any, Any], bool]] = {
     "tendons.NAME.far_tension": lambda scene, tendon: tendon.friction is not None,
     "tendons.NAME.tensions": lambda scene, tendon: tendon.friction is not None,
     "tendons.NAME.released": lambda scene, tendon: tendon.friction is not None,
+    "rings.NAME.drive": lambda scene, ring: ring.driven,
     "motions.NAME.moment": lambda scene, motion: motion.rotation is not None,
     "motions.NAME.force": lambda scene, motion: motion.displacement is not None,
     "stiffness.NAME": lambda scene, node: node.support == "free",

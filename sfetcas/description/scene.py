@@ -37,6 +37,7 @@ from .moving import (
 from .obstacles import check_start, members_of, obstacle
 from .records import Named, Record, Vector, brief, counted, number, say, unknown
 from .remembering import check_memory, refuse_memory, remembering_section
+from .rings import Ring, begins_at, check_ring
 from .sections import CrossSection
 from .shapes import CenterLine, place
 from .showing import named, number_in_words, shown
@@ -60,12 +61,14 @@ __all__ = [
     "Member",
     "Motion",
     "Node",
+    "Ring",
     "Scene",
     "Spring",
     "Tendon",
     "Tube",
     "Until",
     "Way",
+    "check_held",
     "check_loaded",
     "check_scene",
 ]
@@ -103,6 +106,8 @@ class Scene(Record):
         ``[tendons.NAME]``: tendons that pull along their ways, and chambers that push.
     tubes : table by name
         ``[tubes.NAME]``: tubes that share the centre line of members, and turn and slide on it.
+    rings : table by name
+        ``[rings.NAME]``: nodes that slide along members.
     loads : table by name
         ``[loads.NAME]``: forces, moments and distributed loads.
     motions : table by name
@@ -151,6 +156,7 @@ class Scene(Record):
     springs: Named[Spring] = Field(default_factory=dict)
     tendons: Named[Tendon] = Field(default_factory=dict)
     tubes: Named[Tube] = Field(default_factory=dict)
+    rings: Named[Ring] = Field(default_factory=dict)
     loads: Named[Load] = Field(default_factory=dict)
     motions: Named[Motion] = Field(default_factory=dict)
     histories: Named[History] = Field(default_factory=dict)
@@ -269,6 +275,13 @@ class Scene(Record):
         return MappingProxyType({name: runs_of(tube, self.center_lines) for name, tube in self.tubes.items()})
 
     @cached_property
+    def ring_places(self) -> Mapping[str, float]:
+        """Fraction of the length of its member at which each ring is in the undeformed scene, by name."""
+        lines, nodes = self.center_lines, self.nodes
+        found = {name: begins_at(ring, nodes[ring.node], lines[ring.member]) for name, ring in self.rings.items()}
+        return MappingProxyType(found)
+
+    @cached_property
     def tubed(self) -> frozenset[str]:
         """Names of the members along which tubes lie."""
         return frozenset(run.member for runs in self.tube_runs.values() for run in runs)
@@ -286,9 +299,14 @@ class Scene(Record):
 
     @property
     def limited(self) -> bool:
-        """Whether there is what answers must not go beyond: small members, or magnets in fields that are tables."""
+        """Whether there is what answers must not go beyond: small members, rings, magnets in fields that are tables."""
         tables = bool(self.magnets) and any(field.table is not None for field in self.fields.values())
-        return tables or any(member.type == "small" for member in self.members.values())
+        return tables or self.limited_on_ways
+
+    @property
+    def limited_on_ways(self) -> bool:
+        """Whether the loads growing from zero must not lead beyond it either: small members, or rings."""
+        return bool(self.rings) or any(member.type == "small" for member in self.members.values())
 
     @property
     def reversed(self) -> bool:
@@ -392,7 +410,8 @@ class Scene(Record):
         """Table, name and record of all that grows with the load factor or has a history; gravity grows too."""
         for table in DRIVEN:
             for name, record in getattr(self, table).items():
-                yield table, name, record
+                if table != "rings" or record.driven:
+                    yield table, name, record
 
     @property
     def histories_used(self) -> set[str]:
@@ -401,7 +420,7 @@ class Scene(Record):
         return {name for name in (*pushing, *(one.history for _, _, one in self.driven)) if name is not None}
 
 
-DRIVEN = ("loads", "tendons", "tubes", "motions", "actuations", "fields")
+DRIVEN = ("loads", "tendons", "tubes", "rings", "motions", "actuations", "fields")
 """Tables of what grows with the load factor, or with a history."""
 
 _TABLES = {
@@ -411,6 +430,7 @@ _TABLES = {
     "springs": ("spring",),
     "tendons": ("tendon",),
     "tubes": ("tube",),
+    "rings": ("ring",),
     "loads": ("load",),
     "motions": ("prescribed motion",),
     "histories": ("history", "histories"),
@@ -457,10 +477,15 @@ def _check_members(scene: Scene) -> None:
         for node in member.nodes:
             _known(node, scene.nodes, "nodes", "members", name, "nodes")
         _known(member.section, scene.sections, "sections", "members", name, "section")
+    for name, ring in scene.rings.items():
+        _known(ring.node, scene.nodes, "nodes", "rings", name, "node")
+        _known(ring.member, scene.members, "members", "rings", name, "member")
     used = {node for member in scene.members.values() for node in member.nodes}
+    used |= {ring.node for ring in scene.rings.values()}
     for name in scene.nodes:
         if name not in used:
-            raise SceneError("node without member, accepted: a node where at least one member ends", ("nodes", name))
+            message = "node without member, accepted: a node where at least one member ends, or of a ring"
+            raise SceneError(message, ("nodes", name))
 
 
 def check_loaded(scene: Scene) -> None:
@@ -560,6 +585,19 @@ def _check_tubes(scene: Scene) -> None:
         if _massive(scene) and section.missing(["rhoA"]):
             why = _need_of_mass(scene, f"tubes.{name}", "its mass per length")
             raise SceneError(f"the key 'rhoA' is missing: {why}", ("sections", tube.section))
+
+
+def _check_rings(scene: Scene) -> None:
+    for name, ring in scene.rings.items():
+        _known(ring.history, scene.histories, "histories", "rings", name, "history")
+        node, member, line = scene.nodes[ring.node], scene.members[ring.member], scene.center_lines[ring.member]
+        try:
+            check_ring(ring, node, member, line, scene.ring_places[name])
+        except SceneError as error:
+            raise error.within("rings", name) from None
+        if _shears(scene, member):
+            message = f"found the member {ring.member!r}, which shears, so that its line has a corner at the ring"
+            raise SceneError(f"{message}, accepted: {UNSHEARED}", ("rings", name, "member"))
 
 
 def _known(word: str | None, table: Iterable[str], kind: str, *where: str) -> None:
@@ -859,9 +897,19 @@ def _check_supports(scene: Scene) -> None:
     # equilibrium that it begins with.
     free = scene.analysis.type in ("modes", "dynamic") and scene.analysis.initial == "undeformed"
     if not scene.contacts and not free:
-        check_floating(
-            scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension, scene.tendons
-        )
+        check_held(scene)
+
+
+def check_held(scene: Scene) -> None:
+    """Refuse a scene with a part that supports do not hold in every direction.
+
+    Raises
+    ------
+    SceneError
+        Names the nodes of the part and how it can move.
+    """
+    dimension = scene.resolved_dimension
+    check_floating(scene.nodes, scene.members, scene.springs, scene.motions, dimension, scene.tendons, scene.rings)
 
 
 def _check_moving(scene: Scene) -> None:
@@ -936,6 +984,17 @@ def _check_contacts(scene: Scene) -> None:
                 raise SceneError(f"member {member!r} {error}", ("contacts", name)) from None
 
 
+def _shears(scene: Scene, member: Member) -> bool:
+    """Whether the sections of a member do not stay across its centre line."""
+    if not member.stretches(scene.sections):
+        return False
+    return bool(scene.sections[str(member.section)].compliance(0.5)[0, 1:].any())
+
+
+UNSHEARED = "members that do not shear: a section without GA2, GA3 and shear"
+"""What is accepted where members slide."""
+
+
 def _check_stretching_contact(scene: Scene, name: str, member: str) -> None:
     """Refuse contact that is solved for members whose sections stay across their centre line, and keep its length."""
     record, contact = scene.members[member], scene.contacts[name]
@@ -943,8 +1002,8 @@ def _check_stretching_contact(scene: Scene, name: str, member: str) -> None:
         return
     if scene.sections[str(record.section)].stretch_law is not None:
         found, accepted = "has a law of stretch", "members that stretch linearly, or not at all"
-    elif scene.sections[str(record.section)].compliance(0.5)[0, 1:].any():
-        found, accepted = "shears", "members that do not shear: a section without GA2, GA3 and shear"
+    elif _shears(scene, record):
+        found, accepted = "shears", UNSHEARED
     elif contact.radius is not None:
         found, accepted = "stretches", f"obstacles that are not round, as this {contact.type} is, or no stretch"
     else:
@@ -1030,6 +1089,7 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_lengths,
     _check_tendons,
     _check_tubes,
+    _check_rings,
     _check_driven,
     _check_axes,
     _check_dimension,

@@ -13,6 +13,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import first_of_largest
 from .loads import Motion
 from .records import enumerated, say
+from .rings import Ring
 from .springs import Spring
 from .structure import SLIDING, Member, Node, unit
 from .tendons import Tendon
@@ -54,11 +55,13 @@ def components(
     members: Mapping[str, Member],
     springs: Mapping[str, Spring],
     tendons: Mapping[str, Tendon],
+    rings: Mapping[str, Ring],
 ) -> Iterator[list[str]]:
-    """Names of the nodes of each part of the structure that members, springs and tendons connect."""
+    """Names of the nodes of each part of the structure that members, springs, tendons and rings connect."""
     neighbours: dict[str, list[str]] = {name: [] for name in nodes}
     pairs = [(m.nodes[0], other) for m in members.values() for other in m.nodes[1:]]
     pairs += [(s.node, s.to) for s in springs.values() if s.to is not None]
+    pairs += [(ring.node, members[ring.member].nodes[0]) for ring in rings.values()]
     for tendon in tendons.values():
         pairs += pairwise(name for name in _passed(tendon, members) if name is not None)
     for first, second in pairs:
@@ -97,6 +100,7 @@ def check_floating(
     motions: Mapping[str, Motion],
     dimension: str,
     tendons: Mapping[str, Tendon],
+    rings: Mapping[str, Ring],
 ) -> None:
     """Refuse a part of the structure that supports do not hold in every direction.
 
@@ -117,7 +121,7 @@ def check_floating(
             held = one if other is None else other if one is None else None
             if held is not None:
                 sprung[held].append(np.eye(3))
-    for part in components(nodes, members, springs, tendons):
+    for part in components(nodes, members, springs, tendons, rings):
         fixed = np.vstack([fixed_directions(nodes[name], moved.get(name)) for name in part])
         fixed = np.vstack([fixed, *(rows for name in part for rows in sprung[name])])
         free = free_directions(fixed, dimension)

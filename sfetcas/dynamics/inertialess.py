@@ -39,9 +39,11 @@ def check_inertia(equations: Equations, matrix: Array) -> None:
     if equations.model.scene.relaxes:
         message = "found 'idas', but what relaxes in members has no inertia of its own"
         raise SceneError(f"{message}, accepted: {OTHERS}", ("analysis", "integrator"))
-    if equations.model.scene.tubes:
-        message = "found 'idas', but the twist of tubes has no inertia of its own"
-        raise SceneError(f"{message}, accepted: {OTHERS}", ("analysis", "integrator"))
+    scene = equations.model.scene
+    for found, what in ((scene.tubes, "the twist of tubes has"), (scene.rings, "where rings are has")):
+        if found:
+            message = f"found 'idas', but {what} no inertia of its own"
+            raise SceneError(f"{message}, accepted: {OTHERS}", ("analysis", "integrator"))
     null = _null(matrix)
     if null is None:
         return

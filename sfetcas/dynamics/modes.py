@@ -20,9 +20,8 @@ from numpy.typing import ArrayLike
 
 from .. import tolerances
 from ..description.records import counted, nearest
-from ..description.scene import Scene
+from ..description.scene import Scene, check_held
 from ..description.showing import notes_in_words, number_in_words, shown
-from ..description.supports import check_floating
 from ..equilibria import statics
 from ..equilibria.meshing import Meshing
 from ..equilibria.settings import Settings
@@ -308,9 +307,7 @@ class ModalAnalysis:
         strung = scene.stopped or any(tendon.elastic_string for tendon in scene.tendons.values())
         if not any(scene.driven) and not everywhere and not sprung and not strung:
             return None
-        check_floating(
-            scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension, scene.tendons
-        )
+        check_held(scene)
         found = (solve_stopped if scene.stopped else statics.solve)(scene, self.settings)
         self.seconds = dict(found.seconds)
         for what in undecided(found.last.fields):

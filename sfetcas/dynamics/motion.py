@@ -209,7 +209,7 @@ class MotionState(Configuration):
 
     def to_dict(self) -> dict[str, Any]:
         """The quantities of this time as nested dictionaries, of which :meth:`Trajectory.to_dict` makes lists."""
-        tables = self.tables("nodes", "reactions", "springs", "tendons", "tubes", "motions")
+        tables = self.tables("nodes", "reactions", "springs", "tendons", "tubes", "rings", "motions")
         return {**tables, "energy": self.energy, "momentum": self.momentum}
 
 

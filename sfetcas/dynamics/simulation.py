@@ -19,7 +19,7 @@ from ..equilibria.meshing import WHERE, Meshing
 from ..equilibria.quantities import Quantity
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium, superelement_notes
-from ..errors import SceneError, SolveError, Status
+from ..errors import LIMITS, SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.threads import single_threaded
 from ..mechanics.equations import Equations, State
@@ -193,8 +193,9 @@ class Simulation:
         solving = time.perf_counter()
         try:
             for sample in integrator.samples(begun, course):
-                run.instants.append(mover.instant(sample))
-                self._refuse_large(run.instants[-1])
+                instant = mover.instant(sample)
+                self._refuse_beyond_limits(instant)
+                run.instants.append(instant)
                 if watch is not None and watch.passed(run.instants):
                     break
         except KeyboardInterrupt:
@@ -206,7 +207,8 @@ class Simulation:
             elif self.weightless and error.status is Status.STOPPED:
                 error = SolveError(error.status, f"{error.detail}; {SNAPS}", error.last)
             run.failure = error
-        if watch is None or not watch.ended:
+        beyond = run.failure is not None and run.failure.status in LIMITS
+        if not beyond and (watch is None or not watch.ended):
             run.instants += [mover.instant(sample) for sample in integrator.rest()]
         if watch is not None:
             record = integrator.record if len(unilateral) else None
@@ -224,11 +226,10 @@ class Simulation:
         members = (one for one in self.scene.members.values() if one.type == "flexible")
         return any(not self.scene.sections[str(one.section)].mass(HEAVY).all() for one in members)
 
-    def _refuse_large(self, instant: MotionState) -> None:
-        message = instant.fields.too_large() if self.scene.limited else ""
-        if message:
-            status = Status.OUTSIDE if instant.fields.beyond_tables() else Status.BENT
-            raise SolveError(status, f"at {instant.time:.6g} s: {message}")
+    def _refuse_beyond_limits(self, instant: MotionState) -> None:
+        limit = instant.fields.beyond_limits() if self.scene.limited else None
+        if limit is not None:
+            raise SolveError(limit.status, f"at {instant.time:.6g} s: {limit.detail}")
 
     def begun(self, system: StageEquations, free: Equations | None = None) -> tuple[InitialState, tuple[str, ...]]:
         """Where the motion begins, and what is to be said of it; ``free`` are equations without unilateral ones."""
@@ -302,7 +303,7 @@ class Simulation:
         run = self.run(mesh, 0)
         for rounds in range(1, 1 + ROUNDS if analysis.step is None else 1):
             failed = run.failure is not None
-            bent = run.failure is not None and run.failure.status in (Status.BENT, Status.OUTSIDE)
+            bent = run.failure is not None and run.failure.status in LIMITS
             if run.interrupted or bent or (failed and (self.prescribed or rounds > RESCUES)):
                 break
             mesh = mesh if self.prescribed else mesh.refined()

@@ -8,7 +8,7 @@ from dataclasses import replace
 from ..contact.contact_balance import refuse_unbalanced
 from ..contact.contact_statics import ContactRun, Pressed
 from ..contact.settling import Held
-from ..errors import SolveError, Status
+from ..errors import LIMITS, SolveError, Status
 from ..solvers.prepared import Prepared
 from .force_balance import refuse_lost_forces
 from .meshing import EquilibriumResult, Meshing
@@ -74,7 +74,7 @@ class ContactSteps:
         try:
             found = self.ways.grown_from_zero(pilot, factor, self.run.unstopped)
         except SolveError as error:
-            if error.status is Status.BENT:
+            if error.status in LIMITS:
                 raise
             found = None
         if found is None or (self.meshes.switch_branch and found.stability.negative > 0):

@@ -79,8 +79,8 @@ class Meshing:
         The mesh wanted, and the one on which the first equilibrium is found.
     fixed : set of str
         Members whose number of elements is prescribed.
-    switch_branch, has_superelements : bool
-        Whether unstable equilibria are left for stable ones; whether there are small members.
+    switch_branch : bool
+        Whether unstable equilibria are left for stable ones.
     """
 
     def __init__(self, scene: Scene, settings: Settings, stops: tuple[tuple[str, str], ...] = ()) -> None:
@@ -93,7 +93,6 @@ class Meshing:
         self.assembly: Any = settings.assembly
         self.model: Model | None = None
         self.switch_branch = scene.analysis.unstable == "leave"
-        self.has_superelements = any(member.type == "small" for member in scene.members.values())
         self._choose_meshes()
         # Where the mesh is the library's own, its default accuracy is a promise as well.
         self.asked = self.asked or not self.fixed

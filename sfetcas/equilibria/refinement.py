@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -171,7 +172,7 @@ class Refinement:
                 _with_unique_reactions(pilot)
             # What nothing holds on a coarse mesh no finer one holds.
             _refuse_free(pilot.solved)
-        if self.meshes.has_superelements:
+        if self.meshes.scene.limited_on_ways:
             refuse_large(pilot.solved.fields)
         if self.meshes.prescribed:
             return self._on_target(pilot)
@@ -197,7 +198,7 @@ class Refinement:
             elif now.solved.model.mesh.elements > (MOST_FURTHER if now.kept else MOST_ELEMENTS):
                 break
             else:
-                now = self.onto(now.solved.model.mesh.refined(marked), now)
+                now = self.onto(_divided(now, marked), now)
         finer = self.onto(self.halved(now), now)
         difference, error = self._difference(now, finer)
         return self._answer(finer, max(error, self._of_fixed(finer)), difference)
@@ -212,7 +213,7 @@ class Refinement:
         """The mesh with all elements halved, but those of members whose number of elements is prescribed."""
         mesh = now.solved.model.mesh
         marks = {n: np.full(len(c) - 1, n not in self.meshes.fixed) for n, c in mesh.cuts.items()}
-        return mesh.refined(marks)
+        return _divided(now, marks)
 
     def _on_target(self, pilot: EquilibriumResult) -> Equilibrium:
         """Everything was prescribed: solve there, and estimate the error from a mesh beside it."""
@@ -330,6 +331,11 @@ class Refinement:
         """Elements to halve: those that are not smooth, of members whose mesh is not prescribed."""
         rough, model = roughness(found.solved.fields) > smooth, found.solved.model
         return {n: rough[model.elements_of(n)] & (n not in self.meshes.fixed) for n in model.members}
+
+
+def _divided(now: EquilibriumResult, marked: Mapping[str, Array]) -> Mesh:
+    """The mesh with marked elements halved, or divided where a ring pushes them."""
+    return now.solved.model.mesh.refined(marked, now.solved.fields.kinks)
 
 
 def more_than(mesh: Mesh, source: EquilibriumResult) -> str:

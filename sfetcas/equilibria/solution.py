@@ -207,6 +207,12 @@ class Configuration:
         """
         return dict(self.fields.tube(self._known(name, tuple(self.model.scene.tubes), "tube")))
 
+    def ring(self, name: str) -> dict[str, Any]:
+        """State of a ring: ``at``, the fraction of the length of its member where it is, its ``force`` (3,) N on the
+        member, and of one that is driven ``drive`` (N), the force that moves it towards the second node.
+        """
+        return dict(self.fields.ring(self._known(name, tuple(self.model.scene.rings), "ring")))
+
     def along_tube(self, name: str, at: Any) -> dict[str, Array]:
         """Fields of a tube at fractions of its own length, from 0 at its base to 1 at its front end.
 
@@ -329,7 +335,7 @@ class Configuration:
         ----------
         kind : str
             A table of the answer: ``nodes``, ``reactions``, ``members``, ``springs``, ``tendons``, ``tubes``,
-            ``motions``, ``magnets``, ``contacts`` or ``energy``; empty for the quantities of the whole state.
+            ``rings``, ``motions``, ``magnets``, ``contacts`` or ``energy``; empty for those of the whole state.
         name : str
             Name of the record.  Of a member only integral and largest values; :meth:`along` has its fields.
 
@@ -346,6 +352,7 @@ class Configuration:
             "springs": lambda: dict(self.spring(name).to_dict()),
             "tendons": lambda: self.tendon(name),
             "tubes": lambda: self.tube(name),
+            "rings": lambda: self.ring(name),
             "motions": lambda: self.motion(name),
             "magnets": lambda: self.magnet(name),
             "contacts": lambda: self.contacts.get(name, {}),
@@ -448,7 +455,7 @@ class Equilibrium(Configuration):
     def to_dict(self) -> dict[str, Any]:
         """The equilibrium as an entry of ``steps`` in the JSON answer."""
         tables = self.tables(
-            "nodes", "reactions", "members", "springs", "tendons", "tubes", "motions", "magnets", "contacts"
+            "nodes", "reactions", "members", "springs", "tendons", "tubes", "rings", "motions", "magnets", "contacts"
         )
         for name, found in tables["members"].items():
             places = self.places(name)
@@ -649,17 +656,16 @@ LARGEST_AXIAL_FORCE = 0.1
 
 
 def refuse_large(fields: Fields) -> None:
-    """Refuse a state in which a small member is deformed so far that linear elasticity has no meaning, or a magnet is
-    where the table of a field ends.
+    """Refuse a state that is beyond what its scene describes, see :meth:`.Fields.beyond_limits`.
 
     Raises
     ------
     SolveError
-        Names the small member with the largest deformation, or the magnet.
+        Names the small member with the largest deformation, the magnet, or the ring.
     """
-    message = fields.too_large()
-    if message:
-        raise SolveError(Status.OUTSIDE if fields.beyond_tables() else Status.BENT, message)
+    error = fields.beyond_limits()
+    if error is not None:
+        raise error
 
 
 def _notes(fields: Fields) -> Iterator[str]:

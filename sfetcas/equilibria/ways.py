@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..description.records import counted
-from ..errors import SolveError, Status
+from ..errors import LIMITS, SolveError, Status
 from ..mechanics.equations import State
 from ..mechanics.laws import law_of
 from ..mechanics.loading import Loading
@@ -160,11 +160,11 @@ class Ways:
             return self._without_minimum(pilot, factor, last)
         grows = self.meshes.settings.branch and not self.started
         # Where small members bend beyond sense on the way of the loads, nothing else is tried.
-        grown = self._grown(pilot, factor, last) if grows and self.meshes.has_superelements else None
+        grown = self._grown(pilot, factor, last) if grows and self.scene.limited_on_ways else None
         alone, failure = self._direct(pilot, loading)
         if not grows:
             return self._accepted(alone, failure)
-        if not self.meshes.has_superelements:
+        if not self.scene.limited_on_ways:
             grown = self._grown(pilot, factor, last)
         if grown is not None:
             return self._beside(grown, alone)
@@ -199,7 +199,7 @@ class Ways:
         if pilot.model.mesh.elements > PILOT_ELEMENTS or self.meshes.fixed or pilot.diagnosis.mobility:
             return None
         # What falls on and on does so on a finer mesh too; one that is too coarse is left by other ways.
-        if error.status in (Status.ITERATIONS, Status.BENT):
+        if error.status in (Status.ITERATIONS, *LIMITS):
             return None
         mesh = pilot.model.mesh.refined().refined()
         return None if mesh.elements == pilot.model.mesh.elements else self.meshes.prepared(mesh)
@@ -230,7 +230,7 @@ class Ways:
         if taut and error.status not in (Status.INFEASIBLE, Status.STRETCHED):
             rows = ", ".join(dict.fromkeys(free.redundant))
             details.append(f"{TAUT}: {rows}")
-        details += [] if error.status is Status.OUTSIDE else where_fields_end(pilot.model.scene)
+        details += [] if error.status in LIMITS else where_fields_end(pilot.model.scene)
         if error.status in (Status.FAILED, Status.ITERATIONS):
             laws = (law_of(pilot.model.scene, name) for name in pilot.model.members)
             details += dict.fromkeys(law.hint for law in laws if law is not None and law.hint)
@@ -380,7 +380,7 @@ class Ways:
         switch_branch, energy_known = self.meshes.switch_branch and pilot.switches_branch, pilot.model.minimisable
 
         def refuse(there: Solved) -> None:
-            if self.meshes.has_superelements:
+            if self.scene.limited_on_ways:
                 refuse_large(there.fields)
 
         more: dict[str, Any] = {"allowed": allowed, "refuse": refuse, "contraction": self._contraction}

@@ -276,29 +276,31 @@ class Equations:
         """Minus the constant part of the internal force of each segment, (segments, axes), dimensionless."""
         return self._closing_pulls(lam) - self._hanging_pulls(loading)
 
-    def strings(self, state: State, loading: Loading) -> Array:
+    def strings(self, state: State, loading: Loading, *, along: bool = False) -> Array:
         """What strings between nodes of elements take over from these, as a pull, (elements, axes), dimensionless.
 
-        It is linear in the loads and the multipliers.
+        Of what is ``along`` single elements at their starts, as rings; it is linear in the loads and the multipliers.
         """
         model = self.model
         found, first = np.zeros((len(self._owner), model.element.axes)), len(model.positions.rows)
-        if not self._strings:
+        if not self._strings[along]:
             return found
         places = self.retained_places(state, loading)
-        for number, batch in self._strings.items():
+        for number, batch in self._strings[along].items():
             group = model.connections[number]
             lam = state.lam[first + group.labels.ravel()]
             pull = batch(state.q, places, state.unwrapped, loading.loads[number], lam)[0]
-            for k in range(group.kind.spans):
+            for k in range(group.kind.spans or 1):
                 np.add.at(found, group.elements + k, pull)
         return found
 
     @functools.cached_property
-    def _strings(self) -> dict[int, GroupBatch]:
-        """Functions of their pulls, by the numbers of their groups."""
-        groups = enumerate(self.model.connections)
-        return {i: GroupBatch(self.model, group, pulls_of(group.kind)) for i, group in groups if group.kind.spans}
+    def _strings(self) -> tuple[dict[int, GroupBatch], dict[int, GroupBatch]]:
+        """Functions of the pulls of what spans elements, and of what pulls along them, by number of group."""
+        groups = list(enumerate(self.model.connections))
+        spanning = {i: GroupBatch(self.model, group, pulls_of(group.kind)) for i, group in groups if group.kind.spans}
+        along = {i: GroupBatch(self.model, group, pulls_of(group.kind)) for i, group in groups if group.kind.pulls}
+        return spanning, along
 
     def _closing_pulls(self, lam: Array) -> Array:
         positions = self.model.positions

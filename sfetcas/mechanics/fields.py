@@ -16,6 +16,7 @@ from .. import tolerances
 from ..description.answers import single_number
 from ..description.records import enumerated
 from ..description.tendons import Stretch
+from ..errors import SolveError, Status
 from ..mathematics import curves, quaternion
 from ..mathematics.arrays import Array, first_of_largest, values_of
 from ..mathematics.interpolation import differentiation, evaluation
@@ -75,14 +76,22 @@ class Fields:
 
     @functools.cached_property
     def _pull(self) -> Array:
-        """Minus the internal force at the points of elements (elements, points, axes), without that of strings."""
+        """Minus the internal force at the points of elements (elements, points, axes), without that of strings.
+
+        Of an element along which rings are it is that before the first of them.
+        """
         carried = self._equations.segment_pulls(self.state.lam, self._loading)[self.model.segments.owner]
-        return np.asarray(self._loading.pull + (carried + self._strings)[:, None, :])
+        return np.asarray(self._loading.pull + (carried + self._strings + self._ringed)[:, None, :])
 
     @functools.cached_property
     def _strings(self) -> Array:
         """What strings between nodes of elements take over from these, as a pull, (elements, axes)."""
         return self._equations.strings(self.state, self._loading)
+
+    @functools.cached_property
+    def _ringed(self) -> Array:
+        """What rings add to these at the starts of elements, as a pull, (elements, axes)."""
+        return self._equations.strings(self.state, self._loading, along=True)
 
     @functools.cached_property
     def balance(self) -> Balance:
@@ -131,6 +140,24 @@ class Fields:
     def spring(self, name: str) -> SpringState:
         """State of a spring, in SI units."""
         return self.balance.spring(name)
+
+    def ring(self, name: str) -> dict[str, Any]:
+        """Where a ring is, ``at`` as fraction of the length, its ``force`` (3,) N on the member, and where it is driven
+        the force that moves it along the member, ``drive`` N.
+        """
+        model, found = self.model, self.balance.answers("rings", name)
+        length = model.scene.center_lines[model.scene.rings[name].member].length
+        at = model.scene.ring_places[name] + found.pop("moved") / length
+        force = np.array([found.pop(f"force {axis}") for axis in "xyz"])
+        return {"at": at, "force": force, **found}
+
+    @functools.cached_property
+    def kinks(self) -> dict[str, list[float]]:
+        """Fractions of the length at which rings push members, by member, rising."""
+        found: dict[str, list[float]] = {}
+        for name, ring in self.model.scene.rings.items():
+            found.setdefault(ring.member, []).append(self.ring(name)["at"])
+        return {member: sorted(places) for member, places in found.items()}
 
     def drive(self, name: str) -> dict[str, Any]:
         """What enforces a prescribed motion: ``moment`` (N m) of a rotation, ``force`` (N) of a displacement.
@@ -393,6 +420,11 @@ class Fields:
         force = _three(np.einsum("nk,nka->na", at.spread, spread[e]) - pull[e, 0])
         # m' = -r' x n; the pull at the points is minus the force there.
         moment = _summed(at, moments, self._gained(part, pull))
+        for element, place, push in self._pushes(member):
+            beyond = (e == element) & (x > place)
+            force[beyond] -= push
+            arms = (position[beyond] - self.positions(member, np.array([place]))) / model.scales.length
+            moment[beyond] -= np.cross(arms, -push)
         rotation, taken = rotations_along(model, self.state.q, member, x), np.zeros_like(force)
         if stretches_of(model.scene, member):
             about, taken = self._strung(member, x, rotation, moment)
@@ -401,6 +433,18 @@ class Fields:
             if touch.member == member and touch.to is not None:
                 self._lay(touch, x, rotation, force, moment)
         return {"position": position, "rotation": rotation, "force": force, "moment": moment}, taken
+
+    def _pushes(self, member: str) -> list[tuple[int, float, Array]]:
+        """Rings on a member: its element, counted from 0, fraction of the length, and force (3,), dimensionless."""
+        cuts, found = self.model.mesh.cuts[member], list[tuple[int, float, Array]]()
+        for name, ring in self.model.scene.rings.items():
+            if ring.member == member:
+                answer = self.ring(name)
+                at, force = answer["at"], answer["force"] / self.model.scales.force
+                # At an end of elements it is that before it, as the terms of rings have it.
+                element = int(np.clip(np.searchsorted(cuts, at, side="left") - 1, 0, len(cuts) - 2))
+                found.append((element, at, force))
+        return found
 
     def _strung(self, member: str, x: Array, rotation: Array, moment: Array) -> tuple[Array, Array]:
         """Moment and force (n, 3) that tendons along a member carry at its sections, dimensionless."""
@@ -808,7 +852,29 @@ class Fields:
         size = np.linalg.norm(rest - rest[0], axis=1).max()
         return float(max(np.linalg.norm(moved, axis=1).max() / size, np.linalg.norm(spins, axis=1).max()))
 
-    def beyond_tables(self) -> str:
+    def beyond_limits(self) -> SolveError | None:
+        """Why a state is beyond what its scene describes; None where it is not.
+
+        A small member is deformed so far that linear elasticity has no meaning, a magnet is where the table of a field
+        ends, or a ring is beyond an end of its member.
+        """
+        found = (
+            (Status.SLID, self._slid_off()),
+            (Status.OUTSIDE, self._beyond_tables()),
+            (Status.BENT, self._bent_far()),
+        )
+        return next((SolveError(status, message) for status, message in found if message), None)
+
+    def _slid_off(self) -> str:
+        """A sentence on a ring that is beyond an end of its member; else empty."""
+        for name, ring in self.model.scene.rings.items():
+            at = self.ring(name)["at"]
+            if not -tolerances.CLOSED <= at <= 1.0 + tolerances.CLOSED:
+                where = f"at the fraction {at:.6g} of the length of {ring.member!r}"
+                return f"ring {name!r} would be {where}, accepted: 0 to 1"
+        return ""
+
+    def _beyond_tables(self) -> str:
         """A sentence on a magnet that is where the table of a field ends; else empty."""
         scene = self.model.scene
         tables = [name for name, field in scene.fields.items() if field.table is not None]
@@ -818,13 +884,8 @@ class Fields:
                 return f"{name!r} is outside of the table of the field {which}, beyond which there is none"
         return ""
 
-    def too_large(self) -> str:
-        """A sentence on the small member deformed most, where its linear elasticity is meaningless, or on a magnet
-        beyond the table of a field; else empty.
-        """
-        beyond = self.beyond_tables()
-        if beyond:
-            return beyond
+    def _bent_far(self) -> str:
+        """A sentence on the small member deformed most, where its linear elasticity is meaningless; else empty."""
         superelements = {name: self.bent(name) for name, m in self.model.scene.members.items() if m.type == "small"}
         worst = [*superelements, ""][first_of_largest(np.array([*superelements.values(), 0.0]))]
         if not superelements.get(worst, 0.0) > LARGE:
@@ -880,6 +941,10 @@ class Fields:
         model = self.model
         part = model.elements_of(member)
         gains = self._gained(part, self._pull[part]).sum(axis=1)
+        for element, place, push in self._pushes(member):
+            cut = model.mesh.cuts[member][element + 1]
+            arm = np.diff(self.positions(member, np.array([place, cut])), axis=0)[0] / model.scales.length
+            gains[element] += np.cross(arm, push)
         chain = model.rotations.turns[part]
         gains[:-1] -= self.balance.jumps(part)[1:]
         # A couple at a cut is a jump of the moment.

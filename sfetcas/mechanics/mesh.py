@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -105,6 +105,10 @@ class Remembered:
     dissipated: float = 0.0
 
 
+WITHIN = 0.4
+"""Share of an element's length, from its middle, within which it is divided at a kink: slivers gain nothing."""
+
+
 @dataclass(frozen=True)
 class Mesh:
     """A mesh: element type, and the elements of each member.
@@ -151,16 +155,23 @@ class Mesh:
         """Number of elements of all members."""
         return sum(len(cuts) - 1 for cuts in self.cuts.values())
 
-    def refined(self, marked: Mapping[str, Array] | None = None) -> Mesh:
+    def refined(
+        self, marked: Mapping[str, Array] | None = None, kinks: Mapping[str, Sequence[float]] | None = None
+    ) -> Mesh:
         """The mesh with marked elements halved: boolean arrays (elements,) by member; None marks all.
 
-        It remembers nothing: what is remembered belongs to the points of one mesh.
+        An element with a kink, a fraction of the length of its member, is divided there instead, unless that is near to
+        its end.  The mesh remembers nothing: what is remembered belongs to the points of one mesh.
         """
         cuts = {}
         for name, old in self.cuts.items():
             chosen = np.ones(len(old) - 1, bool) if marked is None else marked[name]
             chosen = chosen & (name not in self.rigid)
             middles = 0.5 * (old[1:] + old[:-1])
+            for x in (kinks or {}).get(name, ()):
+                inside = int(np.clip(np.searchsorted(old, x) - 1, 0, len(middles) - 1))
+                if abs(x - middles[inside]) < WITHIN * (old[inside + 1] - old[inside]):
+                    middles[inside] = x
             cuts[name] = np.sort(np.concatenate([old, middles[chosen]]))
         return replace(self, cuts=cuts, memory=None if self.memory is None else {})
 

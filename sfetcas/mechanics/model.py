@@ -36,6 +36,7 @@ from .parts import Parts
 from .positions import Positions, entries, place_nodes
 from .pressure import is_pressure
 from .relaxation import relaxations_in
+from .rings import rings_in
 from .rotating_frame import RotatingFrame, with_rotating_frame
 from .rotations import RotationFreedom, Rotations, number_rotations
 from .segments import Segments, cut_members
@@ -62,6 +63,7 @@ SOURCES: list[Callable[[Parts], Iterable[One]]] = [
     tendons_in,
     rubbing_in,
     tubes_in,
+    rings_in,
 ]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
 
@@ -381,7 +383,8 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         blocks.append(Block("angles", free, f"1 for each of {counted(free, 'free rotation')}: {model.reason}"))
     angles = sum(int(np.unique(part[part >= 0]).size) for part in model.segments.angles.values())
     relaxing = {model.segments.places[i] for i in model.segments.relaxing.flat if i >= 0}
-    strains = sum(len(part) for name, part in model.segments.strained.items() if name not in relaxing) - angles
+    rings = len(model.scene.rings)
+    strains = sum(len(part) for name, part in model.segments.strained.items() if name not in relaxing) - angles - rings
     if strains:
         blocks.append(
             Block("strains", strains, "stretch and shear at the integration points of members that have them")
@@ -392,11 +395,13 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         strains += count
     if angles:
         blocks.append(Block("angles of tubes", angles, "how each tube is twisted against the member at its nodes"))
-    if len(model.positions.unknowns) > strains + angles:
+    if rings:
+        blocks.append(Block("places of rings", rings, "how far each ring has moved along its member"))
+    if len(model.positions.unknowns) > strains + angles + rings:
         why = "nodal assembly" if model.assembly == "nodal" else "nothing but guides hold the structure"
         if model.assembly != "nodal" and model.segments.retained:
-            why = "springs, tendons, small members, slides or followers act upon places"
-        count = len(model.positions.unknowns) - strains - angles
+            why = "springs, tendons, rings, small members, slides or followers act upon places"
+        count = len(model.positions.unknowns) - strains - angles - rings
         blocks.append(Block("displacements", count, f"{why}: positions are unknowns"))
     if model.positions.rows:
         why = "one for each member" if model.assembly == "nodal" else "one for each loop and further held direction"

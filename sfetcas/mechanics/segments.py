@@ -30,6 +30,7 @@ __all__ = [
     "cushioned",
     "cut_members",
     "elongation_of",
+    "place_of_ring",
     "pulled_place",
     "spanned",
     "tensions_of",
@@ -73,7 +74,8 @@ class Segments:
     relaxing : ndarray (2, branches, elements, points)
         The same of the part of the changes of curvature (0) and of the strains (1) that has relaxed in each branch.
     strained : mapping of str to mapping of int to str
-        Components that are unknown at each of these places, which are the last ones, with their names.
+        Components that are unknown at each of these places, which are the last ones, with their names; places of rings
+        are among them.
     pulled : int
         Number of places before these that tell tensions and elongations of tendons.
     angles : mapping of str to ndarray (elements, nodes)
@@ -167,6 +169,11 @@ def angle_of(tube: str, number: int) -> str:
     return f"tubes.{tube}, node {number + 1}"
 
 
+def place_of_ring(ring: str) -> str:
+    """Name of the place whose first displacement says how far a ring has moved along its member."""
+    return f"place of rings.{ring}"
+
+
 def tensions_of(scene: Scene, mesh: Mesh, tendon: str) -> tuple[str, ...]:
     """Names of the places whose displacements are the tension behind each part of a tendon that rubs, but the last.
 
@@ -252,6 +259,8 @@ def _sprung(scene: Scene, mesh: Mesh) -> Iterator[str]:
     for hole in _placed(scene, mesh):
         yield from [hole.node] if hole.node is not None else []
         yield from scene.members[hole.member].nodes if hole.member is not None else ()
+    for ring in scene.rings.values():
+        yield ring.node
     for spring in scene.springs.values():
         if spring.type == "translational":
             yield from (node for node in (spring.node, spring.to) if node is not None)
@@ -300,13 +309,14 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     retained |= set(told)
     # Turning axes act upon all that has mass.
     retained |= set(scene.nodes) if scene.rotating is not None else set()
+    retained |= {ends[ring.member, 0] for ring in scene.rings.values()}
     retained |= set(_sprung(scene, mesh)) | {load.node for load in scene.loads.values() if load.follows and load.node}
     sizes = [part.elements.stop - part.elements.start for part in parts]
     owner = np.repeat(np.arange(len(parts)), sizes)
     strains, strained = _strained(scene, mesh, len(places), len(owner))
     relaxing = _relaxing(scene, mesh, len(places), len(owner), strained)
     angles, twisted = _angles(scene, mesh, len(places) + len(strained))
-    strained |= twisted
+    strained |= twisted | {place_of_ring(name): {0: "arc length"} for name in scene.rings}
     return Segments(
         (*places, *strained),
         frozenset(retained | set(strained)),

@@ -68,6 +68,7 @@ class Stationarity:
         self.on_places, rows = forces.on_places - given.force, list[tuple[int, ca.MX]]()
         self.rotation_jacobian = ca.MX(expressions.axes, 0)
         self._strings: list[tuple[Index, ca.MX]] = []
+        self._along: list[tuple[Index, ca.MX]] = []
         for number, group in enumerate(model.terms):
             n, function = len(group.data), rotation_gradient(group.kind) if entries else rotation_forces(group.kind)
             if not n:
@@ -79,9 +80,10 @@ class Stationarity:
             ]
             if number == 0:
                 arguments[3] += ca.reshape(ca.MX(forces.pull) + ca.MX.zeros(given.pull.shape), *arguments[3].shape)
-            if group.kind.spans:
-                elements = group.elements[:, None] + np.arange(group.kind.spans)
-                self._strings.append((elements, expressions.many(pulls_of(group.kind), n)(*arguments)))
+            if group.kind.spans or group.kind.pulls:
+                elements = group.elements[:, None] + np.arange(group.kind.spans or 1)
+                pulls = expressions.many(pulls_of(group.kind), n)(*arguments)
+                (self._strings if group.kind.spans else self._along).append((elements, pulls))
             found = expressions.many(function, n)(*arguments)
             gaps, acting, *stiff = found[2:] if entries else found
             self.shares.append((tables.sides[number], acting))
@@ -112,9 +114,17 @@ class Stationarity:
     @property
     def strings(self) -> ca.MX:
         """What strings between nodes of elements take over from these, as a pull, (axes, elements)."""
+        return self._summed(self._strings)
+
+    @property
+    def along(self) -> ca.MX:
+        """What rings add to these at the starts of elements, as a pull, (axes, elements)."""
+        return self._summed(self._along)
+
+    def _summed(self, pulls: list[tuple[Index, ca.MX]]) -> ca.MX:
         expressions = self._expressions
         found = ca.MX(expressions.axes, expressions.elements)
-        for elements, pull in self._strings:
+        for elements, pull in pulls:
             n, count = elements.shape
             every = np.repeat(np.arange(n), count)
             onto = sparse(every, elements.ravel(), np.ones(n * count), (n, expressions.elements))

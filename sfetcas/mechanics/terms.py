@@ -106,6 +106,9 @@ class Term(Components, abc.ABC):
     element; before the place at its start where it has one.
     """
 
+    pulls: ClassVar[bool] = False
+    """Whether it is :attr:`along_element` and carries a force beside the internal one at its start, :meth:`pull`."""
+
     strains_member: ClassVar[bool] = False
     """Whether its stored energy is part of the strain energy of the member along which it acts."""
 
@@ -218,7 +221,9 @@ class Term(Components, abc.ABC):
         return None
 
     def pull(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
-        """Of a kind with :attr:`spans`: the force (axes,) along it, which their internal force lacks, fixed axes."""
+        """Of a kind that :attr:`spans` elements, or :attr:`pulls`: the force (axes,) along it, fixed axes, which their
+        internal force lacks.
+        """
         return []
 
     def efforts(self, data: ca.SX, load: ca.SX) -> tuple[Any, ca.SX]:

@@ -160,6 +160,7 @@ def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
         if re.fullmatch(MESHED, name):
             message = "found a number that changes the elements, and with them the unknowns"
             raise SceneError(f"{message}, accepted: one that leaves them as they are", ("arguments", name))
+        _check_rings(scene, name)
         twin = re.fullmatch(BESIDE_DIAGONAL, name)
         if twin is not None:
             message = "found an entry that stands on both sides of the diagonal"
@@ -176,7 +177,7 @@ BESIDE_DIAGONAL = r"(sections\.[^.]+\.stiffness)\.(\d)\.(?!\2)(\d)"
 
 MESHED = (
     r"members\.[^.]+\.elements|(actuations|magnets)\.[^.]+\.(from|to)|tendons\.[^.]+\.way\.\d+\.(from|to|discs(\.\d+)?)"
-    r"|tubes\.[^.]+\.(length|curved_from|insertion)|members\.[^.]+\.insertion"
+    r"|tubes\.[^.]+\.(length|curved_from|insertion)|members\.[^.]+\.insertion|rings\.[^.]+\.at"
 )
 """Names of numbers at which elements end."""
 
@@ -194,6 +195,17 @@ def _check_asked(name: Any, span: Any) -> None:
         ends = []
     if len(ends) != 2:
         raise SceneError(f"found {span!r}, accepted: {accepted}", ("arguments", name))
+
+
+def _check_rings(scene: Scene, name: str) -> None:
+    """Refuse a number with which the node of a ring would leave the undeformed member."""
+    path = name.split(".")
+    for ring_name, ring in scene.rings.items():
+        nodes = {ring.node, *scene.members[ring.member].nodes}
+        placed = path[0] == "nodes" and path[1] in nodes and "position" in path
+        if placed or (path[:2] == ["members", ring.member] and "shape" in path):
+            message = f"found with rings.{ring_name}, whose node has to be on the undeformed member"
+            raise SceneError(f"{message}, accepted: the displacement of a motion", ("arguments", name))
 
 
 def _own(scene: Scene, name: str, given: Parameter) -> Argument:
@@ -245,6 +257,7 @@ def default_arguments(scene: Scene) -> list[str]:
         pulls = ("tension", "pressure", "pull", "length")
         names += [f"tendons.{name}.{key}" for key in pulls if getattr(tendon, key) is not None]
     names += [f"tubes.{name}.{key}" for name in scene.tubes for key in ("angle", "rotation")]
+    names += [f"rings.{name}.travel" for name, ring in scene.rings.items() if ring.driven]
     names += [f"actuations.{name}.value" for name in scene.actuations]
     for name, source in scene.fields.items():
         names += [f"fields.{name}.{key}" for key in ("value", "moment") if getattr(source, key) is not None]
@@ -406,6 +419,7 @@ VALUED = ("loads", "actuations", "fields")
 
 UNITS = {
     "displacement": "m",
+    "travel": "m",
     "rotation": "rad",
     "angle": "rad",
     "position": "m",
@@ -470,7 +484,8 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
 
 def _meaning(path: Sequence[str]) -> str:
     kinds = {"loads": "load", "motions": "motion", "sections": "section", "nodes": "node", "springs": "spring"}
-    kinds |= {"tendons": "tendon", "tubes": "tube", "actuations": "actuation", "fields": "field", "magnets": "magnet"}
+    kinds |= {"tendons": "tendon", "tubes": "tube", "rings": "ring", "actuations": "actuation", "fields": "field"}
+    kinds["magnets"] = "magnet"
     if len(path) < 2:
         return path[0]
     return f"{'.'.join(path[2:])} of the {kinds.get(path[0], path[0])} {path[1]}"

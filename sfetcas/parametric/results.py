@@ -27,6 +27,7 @@ from ..mechanics.load_terms import spread_of
 from ..mechanics.magnetism import magnet_terms
 from ..mechanics.model import Model
 from ..mechanics.reactions import Reactions
+from ..mechanics.rings import up_to
 from ..mechanics.singles import fibre_strain, spin_of, turned_vector
 from ..mechanics.stationarity import Stationarity
 from ..mechanics.stations import Stations
@@ -94,6 +95,7 @@ def default_results(model: Model, *, unique: bool = True) -> list[str]:
     for name, tendon in model.scene.tendons.items():
         names += [f"tendons.{name}.{field}" for field in ("tension", "length", *["far_tension"] * tendon.rubs)]
     names += [f"tubes.{name}.{field}" for name in model.scene.tubes for field in ("torque", "angle")]
+    names += [f"rings.{name}.{field}" for name in model.scene.rings for field in ("at", "force")]
     return [*names, "energy.elastic", "energy.potential"]
 
 
@@ -116,6 +118,7 @@ WHOSE = {
     "springs": "of the spring",
     "tendons": "of the tendon",
     "tubes": "of the tube",
+    "rings": "of the ring",
     "motions": "of the motion",
     "magnets": "of the magnet",
     "energy": "energy",
@@ -418,6 +421,8 @@ class _Outputs:
             return self._tendon(record, key)
         if kind.table == "tubes":
             return self._tube(record, key)
+        if kind.table == "rings":
+            return self._ring(record, key)
         tables = {"nodes": self._node, "reactions": self._reaction, "members": self._member, "motions": self._motion}
         return tables[kind.table](record, key)
 
@@ -630,7 +635,7 @@ class _Outputs:
     def _spread(self) -> tuple[ca.MX, ca.MX, ca.MX]:
         """Distributed forces at the points of all elements, the whole pull there (axes, points), couples of loads."""
         spread, pull, torque = spread_of(self._expressions, self._q, self._y, self._program.given)
-        return spread, self._found.pull + pull + self._on_points(self._found.strings), torque
+        return spread, self._found.pull + pull + self._on_points(self._found.strings + self._found.along), torque
 
     def _on_points(self, values: ca.MX) -> ca.MX:
         """What is the same all along each element, (axes, elements), at its points."""
@@ -643,6 +648,7 @@ class _Outputs:
         spread, pull, _ = self._spread
         first = (n * (self._model.elements_of(member).start + at.elements)).tolist()
         found = self._three(self._points(spread, member, self._within(member, at.spread)) - pull[:, first])
+        found -= self._three(ca.horzcat(ca.MX(self._expressions.axes, 0), *self._pushed(member)[0]))
         return found - self._strung(member)[1] if member in self._tendons else found
 
     def _moment(self, member: str) -> ca.MX:
@@ -704,7 +710,26 @@ class _Outputs:
         _, pull, torque = self._spread
         own += self._crossed(self._on_points(self._found.strings))[:, first.tolist()]
         gained = self._points(self._crossed(pull) - torque, member, self._within(member, at.gained)) - own
-        return self._about(gained)
+        return self._about(gained + ca.horzcat(ca.MX(expressions.turns, 0), *self._pushed(member)[1]))
+
+    def _pushed(self, member: str) -> tuple[list[ca.MX], list[ca.MX]]:
+        """Of each place of a member what rings that are before it in its element add to force and moment there."""
+        model, at, expressions = self._model, self._stations(member), self._expressions
+        cuts, n, begin = model.mesh.cuts[member], expressions.points, model.elements_of(member).start
+        forces = [ca.MX.zeros(expressions.axes) for _ in at.elements]
+        moments = [ca.MX.zeros(expressions.turns) for _ in at.elements]
+        for name in (name for name, ring in model.scene.rings.items() if ring.member == member):
+            place, push = self._ring(name, "at"), self._ring(name, "force")[: expressions.axes] / model.scales.force
+            for i, (element, xi) in enumerate(zip(at.elements.tolist(), at.xi.tolist(), strict=True)):
+                start, end = cuts[element], cuts[element + 1]
+                here = (place - start) / (end - start)
+                inside = here < xi if element == 0 else ca.logic_and(here > 0.0, here < xi)
+                points = slice(n * (begin + element), n * (begin + element + 1))
+                arm = ca.mtimes(self._tangents[:, points], ca.DM(at.gained[i]) - up_to(model.element, here))
+                about = ca.cross(arm, push) if model.space else arm[0] * push[1] - arm[1] * push[0]
+                forces[i] += ca.if_else(inside, push, 0.0)
+                moments[i] += ca.if_else(inside, about, 0.0)
+        return forces, moments
 
     def _crossed(self, pull: ca.MX) -> ca.MX:
         """Cross products of the tangents of all points with what pulls there, (turns, points)."""
@@ -769,6 +794,16 @@ class _Outputs:
             last = own[-1:] if group.kind.along_element else []
             found += [self._told(number, i, key) for i in (last if key == "angle" else own)]
         return sum(found[1:], found[0])
+
+    def _ring(self, name: str, key: str) -> ca.MX:
+        """Place of a ring along its member, its force on it, or the force that drives it."""
+        if key == "drive":
+            return self._connection("rings", name, key)
+        if key == "force":
+            return ca.vertcat(*[self._connection("rings", name, f"force {axis}") for axis in "xyz"])
+        scene = self._model.scene
+        length = scene.center_lines[scene.rings[name].member].length
+        return scene.ring_places[name] + self._connection("rings", name, "moved") / length
 
     # -- stiffness ----------------------------------------------------------------------------------
 

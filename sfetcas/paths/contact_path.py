@@ -121,8 +121,8 @@ class ContactPath:
         if begun is None:
             raise SolveError(Status.FAILED, "no equilibrium in contact to start the path from at factor 0 or beside it")
         trace = tracer.traced(begun[0], self.analysis.points)
-        if trace.message and len(trace.points) == 1:
-            raise SolveError(Status.BENT, trace.message, begun[0].standing.state)
+        if trace.limit is not None and len(trace.points) == 1:
+            raise SolveError(trace.limit.status, trace.limit.detail, begun[0].standing.state)
         if len(trace.points) == 1:
             raise SolveError(Status.FAILED, trace.notes[-1], begun[0].standing.state)
         trace.notes[:0] = begun[1]
@@ -173,7 +173,7 @@ class ContactPath:
         def entries(kind: str) -> tuple[Equilibrium, ...]:
             return tuple(self._entry(run, p, errors.get((kind, j))) for j, p in enumerate(level.of_kind(kind)))
 
-        end = ending(trace.end, trace.points[-1].factor, len(trace.points) - len(trace.limits), trace.message)
+        end = ending(trace.end, trace.points[-1].factor, len(trace.points) - len(trace.limits), str(trace.limit or ""))
         branch = Branch(tuple(points), entries("step"), entries("limit"), (), end)
         notes = (*trace.notes, BIFURCATIONS, *self._unexplained(trace, points))
         status = Status.SHORT if largest > self.meshes.accuracy and self.meshes.asked else Status.SOLVED

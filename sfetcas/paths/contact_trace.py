@@ -15,6 +15,7 @@ from .. import tolerances
 from ..contact.contact_statics import ContactRun
 from ..contact.settling import Held, Ran, free_places, moved, placed
 from ..equilibria.solution import Equilibrium
+from ..errors import SolveError
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.accuracy import largest_difference
 from ..mechanics.equations import State
@@ -72,8 +73,8 @@ class Trace:
         What happened on the way.
     end : str
         Why it ends: ``range``, ``points``, ``lost``, or ``bent``: a small member is bent beyond linear elasticity.
-    message : str
-        For ``bent``: which member, and how far.
+    limit : SolveError or None
+        For ``bent``: what is beyond its limits.
     corners : set of int
         Indices of points after which the contacts change.
     """
@@ -82,7 +83,7 @@ class Trace:
     limits: set[int] = field(default_factory=set)
     notes: list[str] = field(default_factory=list)
     end: str = "points"
-    message: str = ""
+    limit: SolveError | None = None
     corners: set[int] = field(default_factory=set)
 
 
@@ -162,8 +163,8 @@ class Tracer:
                 if trace.end == "lost":
                     return trace
                 continue
-            trace.message = self.curve.plain(there.held.prepared).too_large(there.standing)
-            if trace.message:
+            trace.limit = self.curve.plain(there.held.prepared).beyond_limits(there.standing)
+            if trace.limit is not None:
                 trace.end = "bent"
                 return trace
             end = there.factor if there.factor in self.stops else None

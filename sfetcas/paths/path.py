@@ -366,13 +366,12 @@ class Path:
 
 
 def ending(end: str, factor: float, count: int, message: str) -> str:
-    """A sentence on why a branch of ``count`` points ends at a factor; ``message``: what is too large there."""
-    limit = Status.OUTSIDE if "outside of the table" in message else Status.BENT
+    """A sentence on why a branch of ``count`` points ends at a factor; ``message``: what is beyond its limits there."""
     return {
         "range": f"the factor leaves the range at {factor:g}",
         "points": f"{count} points",
         "closed": "it closes on itself",
         "lost": f"it could not be followed beyond factor {factor:.6g}",
         "margin": f"it ends at factor {factor:.6g}: {message}",
-        "bent": f"beyond factor {factor:.6g} {limit.value} ({message})",
+        "bent": f"beyond factor {factor:.6g} {message}",
     }[end]

@@ -347,7 +347,8 @@ class PathTracing:
         main = _Stretch(choices.follow(curve, start, self.points, MISSING * self.accuracy))
         way = max(abs(point.factor - start.factor) for point in main.traced.points)
         if main.traced.end == "bent" and way < LEAST_WAY * self._widest:
-            raise SolveError(Status.BENT, main.traced.message, start.state)
+            assert main.traced.limit is not None
+            raise SolveError(main.traced.limit.status, main.traced.limit.detail, start.state)
         if main.traced.end == "lost" and way < LEAST_WAY * self._widest:
             detail = f"the path cannot be followed beyond factor {main.traced.points[-1].factor:.3g}"
             raise SolveError(Status.FAILED, detail, start.state)

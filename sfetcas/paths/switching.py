@@ -125,9 +125,14 @@ class Followed:
         return self.parts[-1].traced.end
 
     @property
+    def limit(self) -> SolveError | None:
+        """As of :class:`~sfetcas.solvers.tracing.Traced`."""
+        return self.parts[-1].traced.limit
+
+    @property
     def message(self) -> str:
-        """As of :class:`~sfetcas.solvers.tracing.Traced`; where it ends ``margin``, why."""
-        return self.ending or self.parts[-1].traced.message
+        """Why it ends ``bent`` or ``margin``, a sentence."""
+        return self.ending or str(self.limit or "")
 
     @property
     def count(self) -> int:

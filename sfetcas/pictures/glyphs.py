@@ -17,6 +17,7 @@ from ..description.actuation import Actuation, Magnet, MagneticField
 from ..description.contacts import Contact
 from ..description.loads import Load, Motion
 from ..description.obstacles import obstacle
+from ..description.rings import Ring
 from ..description.sections import evaluate
 from ..description.springs import Spring
 from ..description.structure import SLIDING, Member, Node, unit
@@ -50,6 +51,7 @@ ARROW = 0.12
 """Length of the longest arrow over the size of the picture; sizes below are shares of it, too."""
 SYMBOL = 0.03
 SPRING = "#5A5A5A"
+RING = "#2F6F8F"
 TUBE = "#B4BAC3"
 SPIRAL = 0.026
 """Outer radius of the spiral of a rotational spring."""
@@ -167,7 +169,7 @@ def _sketch_support(sketch: Sketch, name: str, node: Node) -> None:
 def _below(sketch: Sketch, node: str, directions: Sequence[Any]) -> Array:
     """The first of the directions (2,) that no member takes, or the freest."""
     leaving = sketch.view.flat(sketch.leaving(node))
-    blocked = [max(0.72, float((leaving @ np.array(direction)).max())) for direction in directions]
+    blocked = [max(0.72, float((leaving @ np.array(direction)).max(initial=0.0))) for direction in directions]
     return np.array(directions[int(np.argmin(blocked))], float)
 
 
@@ -321,6 +323,17 @@ def _sketch_tube(sketch: Sketch, name: str, tube: Tube) -> None:
     for run in scene.tube_runs[name]:
         line = sketch.along(run.member, np.linspace(run.start, run.end, 97))
         sketch.line(line, f"tube-{name}", colour=TUBE, width=9.0 + 3.0 * longer, level=1.5 - 0.1 * longer)
+
+
+# Rings
+
+
+def _sketch_ring(sketch: Sketch, name: str, ring: Ring) -> None:
+    """A circle around the member where the ring is."""
+    angle = np.linspace(0.0, 2.0 * math.pi, 49)[:, None]
+    radius = 0.4 * SYMBOL * sketch.size
+    around = radius * sketch.view.raised(np.hstack([np.cos(angle), np.sin(angle)]))
+    sketch.line(sketch.at(ring.node) + around, f"ring-{name}", colour=RING, width=1.4, level=8.7)
 
 
 def _arm(sketch: Sketch, hole: Hole) -> Array:
@@ -560,6 +573,7 @@ SUPPORTS: tuple[tuple[str, Glyph], ...] = (
     ("springs", _sketch_spring),
     ("tendons", _sketch_tendon),
     ("tubes", _sketch_tube),
+    ("rings", _sketch_ring),
 )
 """Glyphs of what holds a structure, by the tables of the scene: all that a new kind of record needs for a picture."""
 

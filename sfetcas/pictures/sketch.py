@@ -366,7 +366,7 @@ class Sketch:
             if node in member.nodes:
                 first, last = tangents_of(self.step, name, np.array([0.0, 1.0]))
                 found.append(first if member.nodes[0] == node else -last)
-        return np.array(found)
+        return np.array(found).reshape(-1, 3)
 
 
 def norm(vector: Any) -> float:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import tolerances
+from ..errors import SolveError
 from ..mathematics.arrays import TINY, Array, Index
 from ..mechanics.equations import Point, State
 from ..mechanics.loading import Loading
@@ -137,11 +138,9 @@ class Curve:
         self._linear = set(self.model.groups) == {None}
         self._limited = prepared.model.scene.limited
 
-    def too_large(self, standing: Standing) -> str:
-        """Message naming a small member that bends beyond the range of its linear model, or a magnet beyond that of a
-        table; empty if none does.
-        """
-        return standing.fields.too_large() if self._limited else ""
+    def beyond_limits(self, standing: Standing) -> SolveError | None:
+        """Why a point is beyond what the scene describes, see :meth:`.Fields.beyond_limits`; None where it is not."""
+        return standing.fields.beyond_limits() if self._limited else None
 
     @property
     def remembers(self) -> bool:

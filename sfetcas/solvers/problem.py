@@ -23,6 +23,7 @@ from ..mechanics.equations import State
 from ..mechanics.expressions import Given, SymbolicTerms, data_of
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
+from ..mechanics.rings import reach_of_rings
 from ..mechanics.rotations import RotationFreedom
 from ..mechanics.stationarity import summed
 from ..mechanics.tables import Tables
@@ -71,8 +72,8 @@ class EquilibriumProblem:
             g=ca.vertcat(self._norms(), gaps),
             lower=np.zeros(len(self.row_names)),
             upper=np.zeros(len(self.row_names)),
-            x_lower=np.full(self.x.numel(), -np.inf),
-            x_upper=np.full(self.x.numel(), np.inf),
+            x_lower=self._limits(-1),
+            x_upper=self._limits(1),
             guess=self.unknowns(guess),
             p_value=self.parameters(loading),
             rows=self.row_names,
@@ -80,6 +81,13 @@ class EquilibriumProblem:
             jacobian=self._jacobian(),
             hessian=self._hessian,
         )
+
+    def _limits(self, side: int) -> Array:
+        """Least (-1) or largest (1) values of the unknowns: beyond the end of its member a ring would fall for ever."""
+        limits = np.full(self.x.numel(), side * np.inf)
+        for number, low, high in reach_of_rings(self.model):
+            limits[self._tables.rotation_unknowns + number] = low if side < 0 else high
+        return limits
 
     # -- symbols --------------------------------------------------------------------------------
 

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..errors import SolveError
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import State
 from .arclength import PASSING, Curve, Standing, Tangent
@@ -101,10 +102,10 @@ class Traced:
     events : list of Event
     end : str
         Why it ends: ``range`` (the factor leaves it), ``points`` (as many as asked for), ``closed`` (the last point is
-        the first one again), ``lost`` (no further point was found), ``bent`` (a small member beyond linear
-        elasticity), or ``margin`` (one that is watched is zero at the last point).
-    message : str
-        Where it ends ``bent``: a sentence that names the member and its deformation.
+        the first one again), ``lost`` (no further point was found), ``bent`` (it is beyond what the scene
+        describes), or ``margin`` (one that is watched is zero at the last point).
+    limit : SolveError or None
+        Where it ends ``bent``: what is beyond its limits.
     near : tuple of float
         Factors at which it comes so near to another curve that a step led there at first.
     crossed : tuple of int
@@ -116,7 +117,7 @@ class Traced:
     points: list[Standing]
     events: list[Event]
     end: str
-    message: str = ""
+    limit: SolveError | None = None
     near: tuple[float, ...] = ()
     crossed: tuple[int, ...] = ()
     missed: float = 0.0
@@ -165,7 +166,7 @@ def trace(
         near = traced.near + part.near
         missed = traced.missed + part.missed
         traced = Traced(
-            traced.points + points, traced.events + events, part.end, part.message, near, part.crossed, missed
+            traced.points + points, traced.events + events, part.end, part.limit, near, part.crossed, missed
         )
         curve = curve.on(points[-1].prepared) if points else curve
     return _with_crossed_folds(traced, usual)
@@ -264,7 +265,7 @@ class _Piece:
     events: list[Event] = field(default_factory=list)
     before: Standing | None = None
     end: str = ""
-    message: str = ""
+    limit: SolveError | None = None
     near: list[float] = field(default_factory=list)
     watch: Callable[[Standing], Array] | None = None
     crossed: tuple[int, ...] = ()
@@ -276,7 +277,7 @@ class _Piece:
         _, arrived = advanced(self.points[0], FIRST, self.trial, lambda _: self.ended(), shortest=SHORTEST)
         end, near = self.end if arrived else "lost", tuple(self.near)
         crossed = self.crossed if end == "margin" else ()
-        return Traced(self.points, self.events, end, self.message, near, crossed, self.missed)
+        return Traced(self.points, self.events, end, self.limit, near, crossed, self.missed)
 
     def ended(self) -> bool:
         """Whether no further step is to be taken; ``end`` says why not."""
@@ -302,8 +303,8 @@ class _Piece:
         if there is now:
             self.end = "margin"
             return there, 0.0
-        self.message = curve.too_large(there)
-        if self.message:
+        self.limit = curve.beyond_limits(there)
+        if self.limit is not None:
             self.end = "bent"
             return there, 0.0
         start, last = self.points[0], self.points[-1]
