@@ -157,6 +157,27 @@ def test_the_ring_rests_where_the_energy_is_least():
     assert step.certificate.stable is True
 
 
+def test_two_rings_beside_each_other():
+    """A hundredth apart they nearly clamp the beam: meshes are divided at either."""
+    near = {"nodes.S": {"position": [0.61, 0], "support": "ball"}, "rings.s": {"node": "S", "member": "m"}}
+    step = solve(cantilever(near)).last
+    table = cantilever().to_dict() | {"rings": {}}
+    table["nodes"] = {"A": {"position": [0.61, 0], "support": "clamped"}, "B": {"position": [1, 0]}}
+    clamped = solve(Scene.from_dict(table)).last
+    assert step.ring("s")["at"] - step.ring("r")["at"] == pytest.approx(0.01, abs=1e-6)
+    # A beam that is held over a hundredth of its length yields by some of that share.
+    assert step.position("B")[1] == pytest.approx(clamped.position("B")[1], rel=0.05)
+
+
+def test_what_slides_off_is_told():
+    """A bead on a beam that bends down, a beam that rests on two rings."""
+    bead = {"nodes.R": {"position": [0.6, 0], "mass": 1.0}, "gravity": [0, -1]}
+    with pytest.raises(SolveError, match="a member slides out of a ring") as error:
+        solve(cantilever(bead, analysis={"accuracy": 1e-4}))
+    assert error.value.status is Status.SLID
+    assert "draw ring 'r' to an end of 'm'" in str(error.value)
+
+
 # -- driven along ------------------------------------------------------------------------------------------
 
 

@@ -167,12 +167,12 @@ class Mesh:
         for name, old in self.cuts.items():
             chosen = np.ones(len(old) - 1, bool) if marked is None else marked[name]
             chosen = chosen & (name not in self.rigid)
-            middles = 0.5 * (old[1:] + old[:-1])
+            inner = 0.5 * (old[1:] + old[:-1])
             for x in (kinks or {}).get(name, ()):
-                inside = int(np.clip(np.searchsorted(old, x) - 1, 0, len(middles) - 1))
-                if abs(x - middles[inside]) < WITHIN * (old[inside + 1] - old[inside]):
-                    middles[inside] = x
-            cuts[name] = np.sort(np.concatenate([old, middles[chosen]]))
+                e = int(np.clip(np.searchsorted(old, x) - 1, 0, len(inner) - 1))
+                if abs(x - 0.5 * (old[e] + old[e + 1])) < WITHIN * (old[e + 1] - old[e]):
+                    inner[e] = x
+            cuts[name] = np.sort(np.concatenate([old, inner[chosen]]))
         return replace(self, cuts=cuts, memory=None if self.memory is None else {})
 
     def same(self, other: Mesh) -> bool:

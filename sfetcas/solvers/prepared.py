@@ -260,6 +260,9 @@ class Prepared:
             polished = self.downhill(trial, loading) or polished
         # A structure that falls without end has residual nan, for which every comparison is false: hence the "not".
         if not polished.converged and not polished.residual <= tolerances.BALANCED:
+            slid = problem.slid_off(result.x)
+            if slid:
+                raise SolveError(Status.SLID, slid, trial)
             status = result.status if result.status is not Status.SOLVED else Status.FAILED
             detail = f"IPOPT: {result.message}, {counted(result.iterations, 'iteration')}"
             if result.status is Status.SOLVED:

@@ -13,6 +13,7 @@ import functools
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array, Index
 from ..mathematics.constants import added, picked, sparse, times
@@ -88,6 +89,14 @@ class EquilibriumProblem:
         for number, low, high in reach_of_rings(self.model):
             limits[self._tables.rotation_unknowns + number] = low if side < 0 else high
         return limits
+
+    def slid_off(self, x: Array) -> str:
+        """A sentence on a ring that unknowns keep at an end of its member; empty where none is."""
+        first = self._tables.rotation_unknowns
+        for name, (number, low, high) in zip(self.model.scene.rings, reach_of_rings(self.model), strict=True):
+            if min(x[first + number] - low, high - x[first + number]) < tolerances.REACHED * (high - low):
+                return f"the loads draw ring {name!r} to an end of {self.model.scene.rings[name].member!r}"
+        return ""
 
     # -- symbols --------------------------------------------------------------------------------
 
