@@ -52,7 +52,8 @@ def shot(force, at=0.6, length=1.0):
     start = solve(cantilever(force=force, analysis={"accuracy": 1e-4})).last
     ring, bend = start.ring("r"), start.along("m", 0.0)["moment"][0, 2]
     found = root(missed, [*(ring["force"][:2] + force), bend, ring["at"]], tol=1e-12)
-    assert found.success
+    # Whether steps as small as rounding count as progress differs between processors; what is missed does not.
+    assert np.abs(found.fun).max() < 1e-10
     return found.x[3], found.x[:2] - force, march(found.x[:2], *found.x[2:])[1][:2]
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from .. import tolerances
-from ..description.obstacles import Obstacle, members_of, nearest, obstacle, takes_part
+from ..description.obstacles import Obstacle, members_of, nearest, obstacle, obstacles_among, takes_part
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, unit
 from ..mechanics.equations import Equations, State
@@ -119,13 +119,14 @@ class Opened:
 
 def obstacles_of(model: Model) -> Mapping[str, Obstacle]:
     """The obstacles of a model's scene by name."""
-    return {name: obstacle(contact, model.space) for name, contact in model.scene.contacts.items()}
+    contacts = obstacles_among(model.scene.contacts)
+    return {name: obstacle(contact, model.space) for name, contact in contacts.items()}
 
 
 def edge_sides(scene: Scene) -> dict[tuple[str, str], float]:
     """For each edge and member 1 or -1: sign of (edge x tangent) on the allowed side, in the undeformed scene."""
     found = {}
-    for name, contact in scene.contacts.items():
+    for name, contact in obstacles_among(scene.contacts).items():
         stop = obstacle(contact, scene.resolved_dimension == "space")
         if stop.side is None:
             continue

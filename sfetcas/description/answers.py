@@ -97,6 +97,7 @@ class AnswerKind:
         return self.name not in (
             "certificate.stable",
             "contacts.NAME.member",
+            "contacts.NAME.other",
             "tendons.NAME.slack",
             "tendons.NAME.tensions",
             "tendons.NAME.released",
@@ -177,7 +178,9 @@ magnets.NAME.force | N | x y z | statics, motion, parameters | of fields that ar
 contacts.NAME.force | N | x y z | statics | on the member; of a stretch its resultant
 contacts.NAME.at | | | statics | fraction of the length, or [from, to]; null where nothing touches
 contacts.NAME.gap | m | | statics | smallest distance
-contacts.NAME.member | | | statics | which it touches; all four are lists where it touches more than once
+contacts.NAME.member | | | statics | which it touches; all are lists where it touches more than once
+contacts.NAME.other | | | statics | between members: the second one; the force is that on the first
+contacts.NAME.other_at | | | statics | fraction of the length of the second one
 energy.elastic | J | | all | of members, springs, tendons and tubes
 energy.dissipated | J | | statics, motion | by laws with memory, since undeformed; in motion also by impacts
 energy.loads | J | | statics, motion, parameters | from the undeformed scene

@@ -1,15 +1,21 @@
-"""Frictionless obstacles that members touch from one side: points, lines, planes, circles, cylinders, spheres."""
+"""Frictionless contact: of members with obstacles, points, lines, planes, circles, cylinders and spheres, and of
+members with each other.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, model_validator
 
 from ..errors import SceneError
 from .records import Direction, Positive, Record, Vector, listed, say
+from .sections import CrossSection
+from .structure import Member
 
-__all__ = ["Contact"]
+__all__ = ["Contact", "contact_radius", "pairs_of"]
 
 _KEYS = {
     "point": ({"position", "side"}, set()),
@@ -18,6 +24,7 @@ _KEYS = {
     "circle": ({"center", "radius"}, {"side"}),
     "cylinder": ({"center", "radius"}, {"side", "axis"}),
     "sphere": ({"center", "radius"}, {"side"}),
+    "members": (set(), {"radius"}),
 }
 """Of each type the keys that it needs, and those that it may have."""
 
@@ -35,12 +42,13 @@ def _side(value: Any) -> Any:
 
 
 class Contact(Record):
-    """A frictionless obstacle; its forces push members away and never hold them.
+    """A frictionless obstacle, or members that touch each other; forces push members apart and never hold them.
 
     Parameters
     ----------
     type : text
-        ``point`` (in plane scenes), ``line``, ``plane``, ``circle``, ``cylinder`` or ``sphere``.
+        ``point`` (in plane scenes), ``line``, ``plane``, ``circle``, ``cylinder`` or ``sphere``; ``members`` where
+        members of round section touch each other and, where they are flexible, themselves.
     position : (3,), m
         Of a point that members slide over.
     point : (3,), m
@@ -52,11 +60,11 @@ class Contact(Record):
     center : (3,), m
         Of a circle or sphere, or any point of the axis of a cylinder.
     radius : m
-        Of a circle, cylinder or sphere.
+        Of a circle, cylinder or sphere; of ``members`` that of their surfaces, by default that of their shape.
     axis : (3,)
         Of a cylinder.
     member : name
-        Name of the member that the obstacle stops.
+        Name of the member that the obstacle stops, or that touches itself.
     members : list of names
         Instead of ``member``: several names, or ``"all"``.
     side : (3,), or text
@@ -64,7 +72,7 @@ class Contact(Record):
         ``"outside"``.  Default: of what is round the outside.
     """
 
-    type: Literal["point", "line", "plane", "circle", "cylinder", "sphere"]
+    type: Literal["point", "line", "plane", "circle", "cylinder", "sphere", "members"]
     position: Vector | None = None
     point: Vector | None = None
     normal: Direction | None = None
@@ -83,10 +91,35 @@ class Contact(Record):
         for key in sorted(needed - given):
             raise SceneError(f"the key {key!r} is missing: a {self.type} needs {' and '.join(sorted(needed))}")
         for key in sorted(given - needed - possible - {"type", "member", "members"}):
-            raise SceneError(f"not accepted: the obstacle is a {self.type}", (key,))
+            what = "members touch each other" if self.between_members else f"the obstacle is a {self.type}"
+            raise SceneError(f"not accepted: {what}", (key,))
         if (self.member is None) == (self.members is None):
             raise SceneError("accepted: either member or members, one of them")
         if isinstance(self.side, str) != (self.type in ("circle", "cylinder", "sphere")) and self.side is not None:
             accepted = "a direction [x, y] or [x, y, z]" if isinstance(self.side, str) else "inside or outside"
             raise SceneError(f"found {say(self.side)}, accepted for a {self.type}: {accepted}", ("side",))
         return self
+
+    @property
+    def between_members(self) -> bool:
+        """Whether members touch each other, not an obstacle."""
+        return self.type == "members"
+
+
+def contact_radius(contact: Contact, member: Member, sections: Mapping[str, CrossSection]) -> float | None:
+    """Radius of the surface of a member, m, in a contact between members; None where nothing says it."""
+    if contact.radius is not None:
+        return contact.radius
+    section = sections.get(str(member.section))
+    if section is None or section.shape not in ("circle", "tube"):
+        return None
+    x = np.linspace(0.0, 1.0, 5)
+    outermost = section.fibres(x)[:, 1]
+    return float(outermost[0]) if np.ptp(outermost) == 0.0 else None
+
+
+def pairs_of(names: Iterable[str], members: Mapping[str, Member]) -> list[tuple[str, str]]:
+    """Pairs of members that may touch in a contact between them; flexible ones also touch themselves."""
+    listed = list(names)
+    own = [(name, name) for name in listed if members[name].type == "flexible"]
+    return own + [(a, b) for i, a in enumerate(listed) for b in listed[i + 1 :]]

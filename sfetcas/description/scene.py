@@ -20,7 +20,7 @@ from ..mathematics.quaternion import matrix
 from .actuation import Actuation, Magnet, MagneticField
 from .answers import answer_name, check_answer
 from .changes import FACTOR, Branch, branch_of, carry_ends, with_entries
-from .contacts import Contact
+from .contacts import Contact, contact_radius
 from .dimension import out_of_plane
 from .formulas import Formula
 from .inserting import check_insertion, pushed, refuse_insertion
@@ -956,6 +956,9 @@ def _check_contacts(scene: Scene) -> None:
         if contact.type == "point" and space:
             message = f"found a point, accepted in space: a line, as {scene.dimension_reason}"
             raise SceneError(message, ("contacts", name, "type"))
+        if contact.between_members:
+            _check_between_members(scene, name)
+            continue
         for member in members_of(contact, scene.members):
             if member in magnetised:
                 message = (
@@ -982,6 +985,38 @@ def _check_contacts(scene: Scene) -> None:
                 check_start(obstacle(contact, space), line.positions, line.tangents, scene.size)
             except SceneError as error:
                 raise SceneError(f"member {member!r} {error}", ("contacts", name)) from None
+
+
+def _check_between_members(scene: Scene, name: str) -> None:
+    """Refuse contact between members whose surfaces are not known, or that no search is for."""
+    contact, where = scene.contacts[name], ("contacts", name)
+    if scene.analysis.type != "static":
+        message = f"found contact between members with analysis.type = {scene.analysis.type!r}"
+        raise SceneError(f"{message}, accepted: with 'static'", where)
+    if any(not other.between_members for other in scene.contacts.values()):
+        message = "found contact between members beside obstacles, accepted: one of the two in a scene"
+        raise SceneError(message, where)
+    if scene.stopped:
+        message = "found contact between members beside stops or tendons that may be slack, accepted: one of these"
+        raise SceneError(message, where)
+    names = members_of(contact, scene.members)
+    if contact.members == "all":
+        names = [member for member in names if scene.members[member].type != "small"]
+    if len(names) != len(set(names)):
+        raise SceneError("found a member twice, accepted: each once", (*where, "members"))
+    for member in names:
+        record = scene.members[member]
+        if record.type == "small":
+            message = f"found the small member {member!r}, accepted: flexible and rigid members"
+            raise SceneError(f"{message}, whose shape between their ends is known", where)
+        if contact_radius(contact, record, scene.sections) is None:
+            message = f"found the member {member!r}, whose section has no radius, accepted: the key 'radius'"
+            raise SceneError(f"{message}, or a section with shape = 'circle' or 'tube' of one radius", where)
+        if record.off_line(scene.sections):
+            message = f"found the member {member!r}, whose section has {record.off_line(scene.sections)}"
+            raise SceneError(f"{message}, accepted: members without touch each other", where)
+        if _shears(scene, record):
+            raise SceneError(f"found the member {member!r}, which shears, accepted: {UNSHEARED}", where)
 
 
 def _shears(scene: Scene, member: Member) -> bool:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ..contact.touches import answers
+from ..contact import closest, touches
 from ..description.answers import STATICS, outlined
 from ..description.records import brief, counted, nearest, plain
 from ..description.showing import (
@@ -306,12 +306,17 @@ class Configuration:
 
     @functools.cached_property
     def contacts(self) -> dict[str, dict[str, Any]]:
-        """For each obstacle of the scene: ``force`` (3,) N on the member, ``at``, ``gap`` in m, ``member``.
+        """For each contact of the scene: ``force`` (3,) N on the member, ``at``, ``gap`` in m, ``member``.
 
-        The entries are lists where an obstacle touches at several places.  ``at`` is a fraction of the member's length,
+        The entries are lists where it touches at several places.  ``at`` is a fraction of the member's length,
         or [from, to] of a stretch, with its resultant force; it is None where nothing touches, with the smallest gap.
+        Between members, the force is that on the first one, and ``other`` and ``other_at`` are of the second one.
         """
-        return answers(self.fields) if self.model.scene.contacts else {}
+        scene = self.model.scene
+        if not scene.contacts:
+            return {}
+        found = closest.answers(self.fields) | touches.answers(self.fields)
+        return {name: found[name] for name in scene.contacts}
 
     @functools.cached_property
     def energy(self) -> dict[str, float]:

@@ -28,6 +28,7 @@ from .ways import Ways
 if TYPE_CHECKING:
     from .contact_steps import ContactSteps
     from .further import FurtherEquilibria
+    from .member_contact_steps import MemberContactSteps
 
 __all__ = ["LoadSteps", "Settings", "pilot_of", "solve", "solve_model"]
 
@@ -148,10 +149,14 @@ class LoadSteps:
 
         return FurtherEquilibria(self.meshes, self.refinement, pilot.model)
 
-    def _contact(self) -> ContactSteps | None:
-        """The load steps of a scene with obstacles."""
+    def _contact(self) -> ContactSteps | MemberContactSteps | None:
+        """The load steps of a scene with obstacles, or in which members touch each other."""
         if not self.scene.contacts:
             return None
+        if any(contact.between_members for contact in self.scene.contacts.values()):
+            from .member_contact_steps import MemberContactSteps
+
+            return MemberContactSteps(self.meshes, self.ways, self.refinement)
         from .contact_steps import ContactSteps
 
         return ContactSteps(self.meshes, self.ways, self.refinement)

@@ -351,22 +351,28 @@ class Ways:
 
     def _grown_from_bent(self, pilot: Prepared, factor: float, allowed: Allowed | None) -> EquilibriumResult | None:
         """As :meth:`grown_from_zero`, from where a small share of the loads moves the structure to."""
+        bent = self.bent(pilot, factor)
+        if bent is None:
+            return None
+        begin, state = bent.factor, bent.state
+        found = self._followed(pilot, between(pilot.model, begin, factor), state, (begin, factor), allowed)
+        return None if found is None else replace(found, way=("small share", *found.way[1:]))
+
+    def bent(self, pilot: Prepared, factor: float) -> Solved | None:
+        """The state to which a small share of a load factor moves what has no place of its own without loads."""
         # Without a potential each share is reached in many steps: only the first is tried.
         for share in SMALL_SHARES if pilot.model.minimisable else SMALL_SHARES[:1]:
-            begin = share * factor
-            bent, _ = self._direct(pilot, pilot.model.loading(begin))
+            bent, _ = self._direct(pilot, pilot.model.loading(share * factor))
             if bent is not None:
                 break
         if bent is None:
             return None
-        state = bent.solved.state
         if bent.stability.negative and self.meshes.switch_branch:
             try:
-                state = pilot.switch_branch(bent.solved, bent.solved.loading).state
+                return pilot.switch_branch(bent.solved, bent.solved.loading)
             except SolveError:
                 return None
-        found = self._followed(pilot, between(pilot.model, begin, factor), state, (begin, factor), allowed)
-        return None if found is None else replace(found, way=("small share", *found.way[1:]))
+        return bent.solved
 
     def _followed(
         self,

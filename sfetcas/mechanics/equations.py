@@ -383,9 +383,23 @@ class Equations:
         if len(self._retained):
             # A component along which nothing acts is judged by what acts across it.
             scale[self._retained] = scale[self._retained].max(axis=1, keepdims=True)
+        for unknown, rows in self._sliding:
+            # What slides is judged by the whole force on it: across a member rounding leaves of it what tangents have.
+            np.maximum.at(scale, unknown, np.linalg.norm(state.lam[rows], axis=1))
         values = [group.entries(part, convex=convex) for group, part in zip(self._terms, found, strict=True)]
         rotation_jacobian = found[0][5].reshape(*self.tables.sides[0].shape, self.model.element.axes).copy()
         return Point(potential, stored, residual, scale, self._matrix(values), rotation_jacobian)
+
+    @functools.cached_property
+    def _sliding(self) -> list[tuple[Index, Index]]:
+        """Numbers of unknowns (n,) that say how far something has slid along a member, and of their rows (n, axes)."""
+        found = list[tuple[Index, Index]]()
+        for terms in self._terms[1:]:
+            if terms.kind.pulls and len(terms.group.data):
+                place = terms.group.places[:, -1]
+                unknown = np.where(place < 0, -1, self.place_number[place, 0])
+                found.append((unknown[unknown >= 0], terms.group.labels[unknown >= 0] + len(self.model.positions.rows)))
+        return found
 
     def _of_moments(self, moments: Array) -> Array:
         """Moments about the fixed axes (rotations, 3) on the unknowns."""

@@ -29,7 +29,7 @@ from .laws import curvature_by_moment, form_of
 from .loading import Loading
 from .magnetism import magnet_terms
 from .memory import dissipated_along
-from .mesh import Touch
+from .mesh import ContactPoint, Touch
 from .relaxation import carried, relax
 from .segments import pulled_place
 from .singles import fibre_strain
@@ -151,13 +151,33 @@ class Fields:
         force = np.array([found.pop(f"force {axis}") for axis in "xyz"])
         return {"at": at, "force": force, **found}
 
+    def contact_point(self, point: ContactPoint) -> dict[str, Any]:
+        """Where members touch, ``at`` as fractions of the lengths of both, the ``force`` (3,) N on the first one, and
+        its size ``push`` N, below zero where they pull each other.
+        """
+        found, lines = self.balance.answers("contacts", point.name), self.model.scene.center_lines
+        moved = (found["moved on first"], found["moved on second"])
+        at = tuple(a + s / lines[m].length for a, s, m in zip(point.at, moved, point.members, strict=True))
+        force = np.array([found[f"force {axis}"] for axis in "xyz"])
+        return {"at": at, "force": force, "push": found["push"]}
+
+    @functools.cached_property
+    def _pushed(self) -> dict[str, list[tuple[float, Array]]]:
+        """Where rings and other members push members, fraction of the length and force (3,) N, by member."""
+        found: dict[str, list[tuple[float, Array]]] = {}
+        for name, ring in self.model.scene.rings.items():
+            answer = self.ring(name)
+            found.setdefault(ring.member, []).append((answer["at"], answer["force"]))
+        for point in self.model.mesh.points:
+            answer = self.contact_point(point)
+            for member, at, sign in zip(point.members, answer["at"], (1.0, -1.0), strict=True):
+                found.setdefault(member, []).append((at, sign * answer["force"]))
+        return found
+
     @functools.cached_property
     def kinks(self) -> dict[str, list[float]]:
-        """Fractions of the length at which rings push members, by member, rising."""
-        found: dict[str, list[float]] = {}
-        for name, ring in self.model.scene.rings.items():
-            found.setdefault(ring.member, []).append(self.ring(name)["at"])
-        return {member: sorted(places) for member, places in found.items()}
+        """Fractions of the length at which rings and other members push members, by member, rising."""
+        return {member: sorted(at for at, _ in pushes) for member, pushes in self._pushed.items()}
 
     def drive(self, name: str) -> dict[str, Any]:
         """What enforces a prescribed motion: ``moment`` (N m) of a rotation, ``force`` (N) of a displacement.
@@ -435,15 +455,12 @@ class Fields:
         return {"position": position, "rotation": rotation, "force": force, "moment": moment}, taken
 
     def _pushes(self, member: str) -> list[tuple[int, float, Array]]:
-        """Rings on a member: its element, counted from 0, fraction of the length, and force (3,), dimensionless."""
+        """What pushes a member: its element, counted from 0, fraction of the length, and force (3,), dimensionless."""
         cuts, found = self.model.mesh.cuts[member], list[tuple[int, float, Array]]()
-        for name, ring in self.model.scene.rings.items():
-            if ring.member == member:
-                answer = self.ring(name)
-                at, force = answer["at"], answer["force"] / self.model.scales.force
-                # At an end of elements it is that before it, as the terms of rings have it.
-                element = int(np.clip(np.searchsorted(cuts, at, side="left") - 1, 0, len(cuts) - 2))
-                found.append((element, at, force))
+        for at, force in self._pushed.get(member, ()):
+            # At an end of elements it is that before it, as the terms of rings have it.
+            element = int(np.clip(np.searchsorted(cuts, at, side="left") - 1, 0, len(cuts) - 2))
+            found.append((element, at, force / self.model.scales.force))
         return found
 
     def _strung(self, member: str, x: Array, rotation: Array, moment: Array) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ from ..description.tubes import tube_breaks
 from ..mathematics.arrays import Array, first_of_largest
 from .carried import carried, magnetic, natural_turning
 
-__all__ = ["Cushion", "Mesh", "Remembered", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
+__all__ = ["ContactPoint", "Cushion", "Mesh", "Remembered", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,58 @@ class Touch:
     def places(self) -> tuple[float, ...]:
         """The fractions of the length: one for a place, two for a stretch."""
         return (self.at,) if self.to is None else (self.at, self.to)
+
+
+@dataclass(frozen=True)
+class ContactPoint:
+    """A place where two members touch, or a member touches itself.
+
+    Elements need not end there: where it is on both members are unknowns.
+
+    Attributes
+    ----------
+    contact : str
+        Name of the record.
+    members : (str, str)
+        The first and the second member; the same one twice where it touches itself.
+    at : (float, float)
+        Where the search for it begins, fractions of their lengths.
+    slides : (bool, bool)
+        Whether its place on each member is an unknown; else it stays.
+    distance : float
+        Between the two centre lines, m.
+    number : int
+        Distinguishes the points of one record.
+    normal : (float, float, float), optional
+        Direction along which the distance is measured as long as it is not known how hard the members push, and where
+        they touch is not an unknown.
+    """
+
+    contact: str
+    members: tuple[str, str]
+    at: tuple[float, float]
+    slides: tuple[bool, bool]
+    distance: float
+    number: int = 0
+    normal: tuple[float, float, float] | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of its rows, and of its places."""
+        return f"contacts.{self.contact}, point {self.number + 1}"
+
+    def place(self, side: int) -> str:
+        """Name of the place whose first displacement says how far it has moved along its first or second member."""
+        return f"place of {self.name} on its {('first', 'second')[side]} member"
+
+    def rows(self, axes: int) -> list[str]:
+        """Names of its rows in the plane (two axes) or in space: of the vector between centre lines, and the gap."""
+        return [*(f"{self.name}, {axis + 1} of {axes}" for axis in range(axes)), f"{self.name}, gap"]
+
+    @property
+    def between(self) -> str:
+        """Name of the place that is the vector from the second centre line to the first."""
+        return f"distance of {self.name}"
 
 
 @dataclass(frozen=True)
@@ -129,6 +181,8 @@ class Mesh:
         Springs that are held at a stop: name, and ``low`` or ``high``; tendons that are slack: name, and ``slack``.
     cushions : tuple of Cushion
         Penalty contacts, in the order of their members and fractions.
+    points : tuple of ContactPoint
+        Where members touch each other.
     places : bool
         Whether every end of an element of a flexible member has displacement unknowns, as masses need.
     memory : mapping of str to Remembered, or None
@@ -143,6 +197,7 @@ class Mesh:
     touches: tuple[Touch, ...] = ()
     stops: tuple[tuple[str, str], ...] = ()
     cushions: tuple[Cushion, ...] = ()
+    points: tuple[ContactPoint, ...] = ()
     places: bool = False
     memory: Mapping[str, Remembered] | None = field(default=None, compare=False, repr=False)
 

@@ -25,6 +25,7 @@ from ..mathematics.arrays import Array, Index
 from .actuation import actuations_in
 from .beams import ELEMENT_DATA, Beams, Scales, beams_of, scales_of
 from .connections import connections_in, touches_in
+from .contact_points import contact_points_in
 from .elements import Element, element_by_name
 from .laws import laws_in
 from .load_terms import loads_in
@@ -64,6 +65,7 @@ SOURCES: list[Callable[[Parts], Iterable[One]]] = [
     rubbing_in,
     tubes_in,
     rings_in,
+    contact_points_in,
 ]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
 
@@ -232,7 +234,7 @@ class Model:
         """
         scene = self.scene
         refuse_memory(scene, KNOWS_NO_STEPS)
-        if scene.contacts and not self.mesh.touches:
+        if scene.contacts and not (self.mesh.touches or self.mesh.points):
             message = "a model by itself knows no contact, accepted: the scene without contacts, or solve(scene)"
             raise SceneError(message, ("contacts",))
         stopped = [name for name, spring in scene.springs.items() if spring.stop is not None]
@@ -384,7 +386,9 @@ def _blocks(model: Model) -> tuple[Block, ...]:
     angles = sum(int(np.unique(part[part >= 0]).size) for part in model.segments.angles.values())
     relaxing = {model.segments.places[i] for i in model.segments.relaxing.flat if i >= 0}
     rings = len(model.scene.rings)
-    strains = sum(len(part) for name, part in model.segments.strained.items() if name not in relaxing) - angles - rings
+    points = sum(sum(point.slides) + model.element.axes for point in model.mesh.points)
+    others = angles + rings + points
+    strains = sum(len(part) for name, part in model.segments.strained.items() if name not in relaxing) - others
     if strains:
         blocks.append(
             Block("strains", strains, "stretch and shear at the integration points of members that have them")
@@ -397,11 +401,14 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         blocks.append(Block("angles of tubes", angles, "how each tube is twisted against the member at its nodes"))
     if rings:
         blocks.append(Block("places of rings", rings, "how far each ring has moved along its member"))
-    if len(model.positions.unknowns) > strains + angles + rings:
+    if points:
+        why = f"where members touch at {counted(len(model.mesh.points), 'point')}, and the vectors there"
+        blocks.append(Block("points of contact", points, why))
+    if len(model.positions.unknowns) > strains + others:
         why = "nodal assembly" if model.assembly == "nodal" else "nothing but guides hold the structure"
         if model.assembly != "nodal" and model.segments.retained:
             why = "springs, tendons, rings, small members, slides or followers act upon places"
-        count = len(model.positions.unknowns) - strains - angles - rings
+        count = len(model.positions.unknowns) - strains - others
         blocks.append(Block("displacements", count, f"{why}: positions are unknowns"))
     if model.positions.rows:
         why = "one for each member" if model.assembly == "nodal" else "one for each loop and further held direction"

@@ -28,13 +28,12 @@ from .parts import Parts
 from .segments import place_of_ring
 from .terms import One, Side, Term
 
-__all__ = ["Driven", "Guided", "Ringed", "reach_of_rings", "rings_in", "up_to"]
+__all__ = ["Driven", "Guided", "GuidedTerm", "Ringed", "guided", "reach_of_rings", "rings_in", "up_to"]
 
 
-@final
 @dataclass(frozen=True)
-class Guided(Term):
-    """The share of one element in the constraint of a ring.
+class GuidedTerm(Term):
+    """The share of one element in a constraint on the place of its member at an unknown arc length.
 
     Data: tangents and compliances of the points of the element, then arc lengths of its start and its end, and ``s_0``.
 
@@ -43,9 +42,10 @@ class Guided(Term):
     element : Element
     first, last : bool
         Whether it is the first and the last element of its member, which go on beyond the end.
+    opposite : bool
+        Whether the place of the member counts with the other sign.
     """
 
-    table: ClassVar[str] = "rings"
     along_element: ClassVar[bool] = True
     shares_row: ClassVar[bool] = True
     pulls: ClassVar[bool] = True
@@ -53,10 +53,11 @@ class Guided(Term):
     element: Element
     first: bool
     last: bool
+    opposite: bool = False
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """The rotations of the element and its strains; behind these the place of the ring, once for each row.
+        """The rotations of the element and its strains; behind these the place along the member, once for each row.
 
         The forces on it cancel from row to row: sides of their own let it be seen beside what they are zero.
         """
@@ -70,7 +71,10 @@ class Guided(Term):
         now = ca.horzcat(*self.element.tangents(q, u[: -self.axes], line))
         rest = ca.mtimes(self.element.line(line)[0], self._weights(begin, start, end))
         moved = [self._weights(begin + place[0], start, end) for place in u[-self.axes :]]
-        return [rest[i] - ca.mtimes(now[i, :], here) for i, here in enumerate(moved)]
+        return [self._signed(rest[i] - ca.mtimes(now[i, :], here)) for i, here in enumerate(moved)]
+
+    def _signed(self, value: ca.SX) -> ca.SX:
+        return -value if self.opposite else value
 
     def _weights(self, s: ca.SX, start: ca.SX, end: ca.SX) -> ca.SX:
         """Weights (points,) of the tangents of the points in the line from the start of the element up to ``s``."""
@@ -82,9 +86,17 @@ class Guided(Term):
         return up_to(self.element, here)
 
     def pull(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
-        """The force that the element carries to the ring, at its start."""
+        """The force that the element carries to the place, at its start."""
         begins = 1.0 if self.first else ca.if_else(data[-1] + u[-1][0] > data[-3], 1.0, 0.0)
-        return ca.vertsplit(-lam * begins)
+        return ca.vertsplit(-self._signed(lam) * begins)
+
+
+@final
+@dataclass(frozen=True)
+class Guided(GuidedTerm):
+    """The share of one element in the constraint of a ring."""
+
+    table: ClassVar[str] = "rings"
 
 
 def up_to(element: Element, here: Any) -> Any:
@@ -154,20 +166,47 @@ def rings_in(parts: Parts) -> Iterator[One]:
         start = segments.place(segments.ends[ring.member, 0])
         places = (segments.place(ring.node), start, place)
         yield One(Ringed(parts.element.space), name, ring.node, np.zeros(0), (), places, row)
-        length = scene.center_lines[ring.member].length / unit
-        cuts, first = parts.mesh.cuts[ring.member], parts.beams.first[ring.member]
-        begin = scene.ring_places[name] * length
-        for i in range(len(cuts) - 1):
-            kind = Guided(parts.element.space, parts.element, i == 0, i == len(cuts) - 2)
-            number = first + i
-            line = [parts.beams.tangent[number].ravel(), parts.beams.compliance[number].ravel()]
-            ends = [np.reshape(numbers(s), (1,)) for s in (cuts[i] * length, cuts[i + 1] * length, begin)]
-            turns = tuple(parts.rotations.turns[number].tolist())
-            sides = (*parts.segments.strains[number].tolist(), *[place] * parts.element.axes)
-            yield One(kind, name, "", numbers(np.concatenate([*line, *ends])), turns, sides, row, element=number)
+        yield from guided(parts, Guided, (name, row), (ring.member, scene.ring_places[name]), place)
         if ring.travel is not None:
             load = {ring.history: np.reshape(numbers(ring.travel / unit), (1,))}
             yield One(Driven(parts.element.space), name, "", np.zeros(0), (), (place,), f"{row}.travel", load)
+
+
+def guided(
+    parts: Parts,
+    kind: type[GuidedTerm],
+    names: tuple[str, str],
+    at: tuple[str, float],
+    place: int,
+    opposite: bool = False,
+) -> Iterator[One]:
+    """The shares of all elements of a member in the constraint on one of its places.
+
+    Parameters
+    ----------
+    parts : Parts
+    kind : subclass of GuidedTerm
+    names : (str, str)
+        Name of the record and of the rows.
+    at : (str, float)
+        The member, and where the place begins, a fraction of its length.
+    place : int
+        Number of the place whose first displacement is how far it has moved; the ground where it stays.
+    opposite : bool
+        As of :class:`GuidedTerm`.
+    """
+    member, unit = at[0], parts.scales.length
+    length = parts.scene.center_lines[member].length / unit
+    cuts, first = parts.mesh.cuts[member], parts.beams.first[member]
+    for i in range(len(cuts) - 1):
+        term = kind(parts.element.space, parts.element, i == 0, i == len(cuts) - 2, opposite)
+        number = first + i
+        line = [parts.beams.tangent[number].ravel(), parts.beams.compliance[number].ravel()]
+        ends = [np.reshape(numbers(s), (1,)) for s in (cuts[i] * length, cuts[i + 1] * length, at[1] * length)]
+        turns = tuple(parts.rotations.turns[number].tolist())
+        sides = (*parts.segments.strains[number].tolist(), *[place] * parts.element.axes)
+        data = numbers(np.concatenate([*line, *ends]))
+        yield One(term, names[0], "", data, turns, sides, names[1], element=number)
 
 
 def reach_of_rings(model: Any) -> Iterator[tuple[int, float, float]]:

@@ -75,7 +75,7 @@ class Segments:
         The same of the part of the changes of curvature (0) and of the strains (1) that has relaxed in each branch.
     strained : mapping of str to mapping of int to str
         Components that are unknown at each of these places, which are the last ones, with their names; places of rings
-        are among them.
+        and of contact points are among them.
     pulled : int
         Number of places before these that tell tensions and elongations of tendons.
     angles : mapping of str to ndarray (elements, nodes)
@@ -310,6 +310,7 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     # Turning axes act upon all that has mass.
     retained |= set(scene.nodes) if scene.rotating is not None else set()
     retained |= {ends[ring.member, 0] for ring in scene.rings.values()}
+    retained |= {ends[member, 0] for point in mesh.points for member in point.members}
     retained |= set(_sprung(scene, mesh)) | {load.node for load in scene.loads.values() if load.follows and load.node}
     sizes = [part.elements.stop - part.elements.start for part in parts]
     owner = np.repeat(np.arange(len(parts)), sizes)
@@ -317,6 +318,10 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     relaxing = _relaxing(scene, mesh, len(places), len(owner), strained)
     angles, twisted = _angles(scene, mesh, len(places) + len(strained))
     strained |= twisted | {place_of_ring(name): {0: "arc length"} for name in scene.rings}
+    axes = "xyz" if scene.resolved_dimension == "space" else "xy"
+    for point in mesh.points:
+        strained |= {point.place(side): {0: "arc length"} for side in (0, 1) if point.slides[side]}
+        strained[point.between] = dict(enumerate(axes))
     return Segments(
         (*places, *strained),
         frozenset(retained | set(strained)),

@@ -131,7 +131,8 @@ def _symbol(sketch: Sketch, node: str, down: Array) -> _Symbol:
 
 
 def _sketch_contact(sketch: Sketch, name: str, contact: Contact) -> None:
-    sketch_obstacle(sketch, name, obstacle(contact, sketch.step.model.space))
+    if not contact.between_members:
+        sketch_obstacle(sketch, name, obstacle(contact, sketch.step.model.space))
 
 
 def _sketch_node(sketch: Sketch, name: str, node: Node) -> None:

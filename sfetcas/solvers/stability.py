@@ -9,6 +9,10 @@ of inertia: the negative eigenvalues of ``H - sigma M`` less those of the Schur 
 The weight of a rotation is the length of member at it times the smallest ratio of stiffness to squared length of all
 members: the eigenvalues are pure numbers, of the size of one for modes of the softest member.
 
+Places at which members touch each other are unknowns in which the Lagrangian is largest, not least: of all places the
+worst one must not penetrate.  Each adds a negative eigenvalue, which is left out of all counts; with the places
+eliminated the others have the signs of the energy of what moves (Haynsworth's additivity of inertia).
+
 Under pressure that has a potential, as even pressure on a closed ring, the Newton matrix is symmetric but for errors of
 the mesh; its symmetric part is taken, whose eigenvalues are those of the energy to second order in these errors.
 """
@@ -101,6 +105,7 @@ class StabilityTest:
         self._in_a = np.flatnonzero((equations.row >= equations.unknowns) & (column >= 0))
         self._a_column = column[self._in_a]
         self._diagonal = np.flatnonzero(self._h_row == self._h_column)
+        self._apart = sum(sum(point.slides) for point in equations.model.mesh.points)
 
     @functools.cached_property
     def _combine(self) -> Array:
@@ -186,7 +191,7 @@ class StabilityTest:
             values, _, limits = self._mode_by_mode(point, entries)
             return values, limits
         if self._is_dense:
-            return np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0]), limit
+            return np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0])[self._apart :], limit
         return None
 
     def negative(self, point: Point) -> int:
@@ -261,8 +266,8 @@ class StabilityTest:
         half = np.linalg.solve(root, mass)
         inverse = np.linalg.solve(root, half.T)
         found, vectors = np.linalg.eigh(0.5 * (inverse + inverse.T))
-        values = shift + 1.0 / np.maximum(found[::-1], 1.0 / LOWEST)
-        vectors = scale[:, None] * (basis @ np.linalg.solve(root.T, vectors[:, ::-1]))
+        values = (shift + 1.0 / np.maximum(found[::-1], 1.0 / LOWEST))[self._apart :]
+        vectors = scale[:, None] * (basis @ np.linalg.solve(root.T, vectors[:, ::-1]))[:, self._apart :]
         vectors = vectors / np.linalg.norm(vectors, axis=0)
         rounding = blurred(self._h_row, self._h_column, entries, vectors)
         return values, vectors, tolerances.NEUTRAL + rounding + ENTRIES_BLUR * abs(shift)
@@ -350,7 +355,7 @@ class StabilityTest:
 
     def _dense(self, point: Point, entries: Array, limit: float) -> tuple[Array, Array, int]:
         projected, basis = self._projected(entries, self._rows(point))
-        values, vectors = np.linalg.eigh(projected)
+        values, vectors = (part[..., self._apart :] for part in np.linalg.eigh(projected))
         if not len(values):
             return values, basis, 0
         return values, basis @ vectors[:, : alike(values)], int((values < -limit).sum())
@@ -398,10 +403,10 @@ class StabilityTest:
         matrix = ca.DM(self._pattern, shifted)
         self._ldl.nfact(matrix)
         if not len(rows):
-            return self._ldl.neig(matrix)
+            return self._ldl.neig(matrix) - self._apart
         schur = rows @ self._ldl.solve(matrix, ca.DM(rows.T)).full()
         values = np.linalg.eigvalsh(0.5 * (schur + schur.T))
-        return self._ldl.neig(matrix) - int((values < 0.0).sum())
+        return self._ldl.neig(matrix) - int((values < 0.0).sum()) - self._apart
 
     def _below_bordered(self, point: Point, shift: float) -> int:
         """As :meth:`_below` from the whole Newton matrix with a slight primal and dual regularisation.
@@ -433,12 +438,12 @@ class StabilityTest:
             except np.linalg.LinAlgError:
                 continue
             if np.abs(gap).max() < BROKEN:
-                return self._bordered.neig(matrix) - equations.rows
+                return self._bordered.neig(matrix) - equations.rows - self._apart
         return None
 
     def _below_dense(self, point: Point, shift: float) -> int:
         values = np.linalg.eigvalsh(self._projected(self._weighted(point), self._rows(point))[0])
-        return int((values < shift).sum())
+        return int((values[self._apart :] < shift).sum())
 
     @functools.cached_property
     def _bordered_pattern(self) -> ca.Sparsity:

@@ -1,0 +1,383 @@
+"""Where members are nearest to each other: local minima of the distance between their centre lines.
+
+Each member is sampled as a chain of straight pieces.  A tree of their middles gives the pairs of pieces that may be
+near, so that the effort grows with the number of members and of what is near, not with that of all pairs.  From each
+pair that is nearer than those beside it, Newton's method leads to the minimum between the curves.
+
+A member is not near to itself, or to a member that continues it, over less than half a turn of the smallest circle that
+its surface allows: no two places nearer to each other along the members can touch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..description.contacts import contact_radius, pairs_of
+from ..description.obstacles import members_of
+from ..description.scene import Scene
+from ..mathematics.arrays import TINY, Array, Index
+from ..mechanics.fields import Fields
+
+__all__ = ["FLAT", "Closest", "Near", "Pair", "answers"]
+
+PIECES = 4
+"""Straight pieces of an element at least."""
+
+SLENDER = 6.0
+"""Length of a piece at most, over the radius of its member: chains then find minima one radius apart."""
+
+MOST_PIECES = 4_000
+"""Straight pieces of a member at most, for which slender ones are longer."""
+
+FLAT = 1e-3
+"""Least curvature of the distance, over that of a circle of this radius, at which a minimum is a point; below it lines
+touch, and the place on the first of them stays.
+"""
+
+BEND = 1e-6
+"""Fraction of a length over which tangents are differenced for the curvature of a centre line."""
+
+ITERATIONS, ARRIVED = 40, 1e-13
+"""Newton's steps at most, and fraction of the length of the longer member that is as good as none."""
+
+SAME = 0.5
+"""Minima nearer to each other than this part of the distance of the centre lines are one, along both members."""
+
+NEXT_TO = 0.95
+"""Part of half a turn of the smallest circle within which places along members are not near to each other."""
+
+
+@dataclass(frozen=True)
+class Near:
+    """A local minimum of the distance between two members.
+
+    Attributes
+    ----------
+    contact : str
+    members : (str, str)
+    at : (float, float)
+        Fractions of their lengths.
+    normal : ndarray (3,)
+        Unit vector from the second to the first centre line.
+    apart : float
+        Distance of the centre lines, m.
+    distance : float
+        Sum of the radii, m.
+    """
+
+    contact: str
+    members: tuple[str, str]
+    at: tuple[float, float]
+    normal: Array
+    apart: float
+    distance: float
+
+    @property
+    def gap(self) -> float:
+        """Distance of the surfaces, m; below zero where they penetrate."""
+        return self.apart - self.distance
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two members that may touch, or one that may touch itself, and the sum of their radii, m."""
+
+    contact: str
+    members: tuple[str, str]
+    distance: float
+
+
+class Closest:
+    """The search for what is near among the members of a scene that may touch each other."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.pairs: list[Pair] = []
+        for name, contact in scene.contacts.items():
+            if contact.between_members:
+                names = [m for m in members_of(contact, scene.members) if scene.members[m].type != "small"]
+                radii = {m: contact_radius(contact, scene.members[m], scene.sections) or 0.0 for m in names}
+                for a, b in pairs_of(names, scene.members):
+                    # Where they touch along a line places are those of the nodes of the first one.
+                    a, b = (b, a) if scene.members[a].type == "rigid" else (a, b)
+                    self.pairs.append(Pair(name, (a, b), radii[a] + radii[b]))
+        self.members = sorted({member for pair in self.pairs for member in pair.members})
+        self.lengths = {member: scene.center_lines[member].length for member in self.members}
+        self.least = {
+            member: 0.5 * min(pair.distance for pair in self.pairs if member in pair.members) for member in self.members
+        }
+        self.largest = max((pair.distance for pair in self.pairs), default=0.0)
+
+    def samples(self, fields: Fields, member: str) -> Array:
+        """Fractions (n,) of the length of a member between which it is nearly straight."""
+        cuts = fields.model.mesh.cuts[member]
+        each = np.diff(cuts) * self.lengths[member] / (SLENDER * self.least[member])
+        most = max(PIECES, MOST_PIECES // (len(cuts) - 1))
+        counts = np.clip(np.ceil(each), PIECES, most).astype(int)
+        parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(cuts, cuts[1:], counts, strict=False)]
+        return np.append(np.concatenate(parts), 1.0)
+
+    def found(self, fields: Fields, reach: float, pairs: Sequence[Pair] | None = None) -> list[Near]:
+        """All minima, of given pairs or of all, at which surfaces are nearer to each other than ``reach``, m."""
+        pairs = self.pairs if pairs is None else pairs
+        if not pairs:
+            return []
+        x = {member: self.samples(fields, member) for member in self.members}
+        points = {member: fields.positions(member, x[member]) for member in self.members}
+        near: list[Near] = []
+        for pair, at in self._candidates(points, x, reach, pairs):
+            near += self._minima(fields, pair, at, reach)
+        return near
+
+    # -- pieces -----------------------------------------------------------------------------------
+
+    def _candidates(
+        self, points: dict[str, Array], x: dict[str, Array], reach: float, pairs: Sequence[Pair]
+    ) -> Iterator[tuple[Pair, Array]]:
+        """For each pair of members places (2, n) on both where pieces are nearer to each other than those beside them.
+
+        Pieces of one member that follow each other are among those that are compared: beside them nothing is nearest.
+        """
+        from scipy.spatial import cKDTree
+
+        middles = [0.5 * (points[member][1:] + points[member][:-1]) for member in self.members]
+        starts = np.concatenate([[0], np.cumsum([len(part) for part in middles])])
+        owners = np.repeat(np.arange(len(middles)), np.diff(starts))
+        longest = max(float(np.linalg.norm(np.diff(points[m], axis=0), axis=1).max()) for m in self.members)
+        # A piece is at most half of it from its middle, and its arc rises above it by less than a quarter.
+        limit = self.largest + reach + 1.5 * longest
+        found = cKDTree(np.concatenate(middles)).query_pairs(limit, output_type="ndarray")
+        one, other = owners[found[:, 0]], owners[found[:, 1]]
+        number = {member: k for k, member in enumerate(self.members)}
+        for pair in pairs:
+            (a, b), (first, second) = (number[m] for m in pair.members), pair.members
+            chosen = found[(np.minimum(one, other) == min(a, b)) & (np.maximum(one, other) == max(a, b))]
+            if not len(chosen):
+                continue
+            # The tree gives the lower number first.
+            i, j = (chosen if a <= b else chosen[:, ::-1]).T - np.array([[starts[a]], [starts[b]]])
+            p, r = points[first], points[second]
+            s, t, distances = _closest_on_pieces(p[i], p[i + 1], r[j], r[j + 1])
+            least = _locally_least(i, j, distances, len(r)) & (distances < pair.distance + reach + 0.5 * longest)
+            at = np.array([x[first][i] + s * (x[first][i + 1] - x[first][i]), x[second][j] + t * np.diff(x[second])[j]])
+            least &= ~self._next_to(pair, *at)
+            if least.any():
+                yield pair, at[:, least]
+
+    def _next_to(self, pair: Pair, s: Array, t: Array) -> Array:
+        """Whether places (n,) on both members are so near to each other along the members that they cannot touch."""
+        a, b = pair.members
+        limit = NEXT_TO * 0.5 * np.pi * pair.distance
+        if a == b:
+            return np.asarray(np.abs(s - t) * self.lengths[a] < limit)
+        found = np.zeros(len(s), bool)
+        one, other = self.scene.members[a].nodes, self.scene.members[b].nodes
+        for i, node in enumerate(one):
+            for k, same in enumerate(other):
+                if node == same:
+                    along = np.abs(s - i) * self.lengths[a] + np.abs(t - k) * self.lengths[b]
+                    found |= along < limit
+        return found
+
+    # -- curves -----------------------------------------------------------------------------------
+
+    def _minima(self, fields: Fields, pair: Pair, at: Array, reach: float) -> Iterator[Near]:
+        """Minima between the curves from places (2, n) on both; each once."""
+        a, b = pair.members
+        lengths = np.array([[self.lengths[a]], [self.lengths[b]]])
+        at = np.clip(at, 0.0, 1.0)
+        begin = at.copy()
+        for _ in range(ITERATIONS):
+            slope, curvature, apart, _ = self._distance(fields, pair, at)
+            step = _downhill(slope, curvature, apart, at) / lengths
+            # As long as the pieces at most: a minimum is not far from where pieces are nearest.
+            longest = np.maximum(0.25 * apart, self.largest) / lengths
+            step = np.clip(step, -longest, longest)
+            after = np.clip(at + step, 0.0, 1.0)
+            moved, at = np.abs(after - at).max(initial=0.0), after
+            if moved < ARRIVED:
+                break
+        slope, curvature, apart, normals = self._distance(fields, pair, at)
+        known: list[tuple[float, float]] = []
+        order = np.argsort(apart, kind="stable")
+        far = np.abs(at - begin).max(axis=0, initial=0.0) if at.size else np.zeros(0)
+        for i in order.tolist():
+            if apart[i] >= pair.distance + reach or far[i] > 0.5:
+                continue
+            if self._next_to(pair, at[0, [i]], at[1, [i]])[0]:
+                continue
+            place = (float(at[0, i]), float(at[1, i]))
+            if any(self.alike(pair.members, place, other, pair.distance) for other in known):
+                continue
+            known.append(place)
+            yield Near(pair.contact, pair.members, place, normals[i], float(apart[i]), pair.distance)
+
+    def beside(self, fields: Fields, pair: Pair, stations: Array, reach: float) -> list[Near]:
+        """Of places (n,) of the first member of a pair those at which the second one is nearer than ``reach``, m.
+
+        Where a member is beside itself each place counts with those that come later on it.
+        """
+        first, second = pair.members
+        x = self.samples(fields, second)
+        here, points = fields.positions(first, stations), fields.positions(second, x)
+        begin, chords = points[:-1], np.diff(points, axis=0)
+        out = here[:, None, :] - begin[None, :, :]
+        share = np.clip(np.einsum("npi,pi->np", out, chords) / np.einsum("pi,pi->p", chords, chords), 0.0, 1.0)
+        t = x[:-1] + share * np.diff(x)
+        distances = np.linalg.norm(out - share[:, :, None] * chords, axis=2)
+        if first == second:
+            near = (t - stations[:, None]) * self.lengths[first] < NEXT_TO * 0.5 * np.pi * pair.distance
+            distances = np.where(near, np.inf, distances)
+        best = np.argmin(distances, axis=1)
+        longest = float(np.linalg.norm(chords, axis=1).max())
+        close = distances[np.arange(len(best)), best] < pair.distance + reach + 0.5 * longest
+        at = np.array([stations, t[np.arange(len(best)), best]])[:, close]
+        if not at.size:
+            return []
+        length = self.lengths[second]
+        for _ in range(ITERATIONS):
+            slope, curvature, apart, _ = self._distance(fields, pair, at)
+            step = -slope[1] / np.maximum(np.abs(curvature[1, 1]), 1e-3 * FLAT / apart)
+            step = np.clip(step, -self.largest, self.largest) / length
+            after = np.clip(at[1] + step, 0.0, 1.0)
+            moved, at[1] = np.abs(after - at[1]).max(), after
+            if moved < ARRIVED:
+                break
+        _, _, apart, normals = self._distance(fields, pair, at)
+        chosen = (apart < pair.distance + reach) & ~self._next_to(pair, *at)
+        if first == second:
+            chosen &= at[0] < at[1]
+        return [
+            Near(pair.contact, pair.members, (float(s), float(t)), n, float(a), pair.distance)
+            for s, t, n, a in zip(at[0][chosen], at[1][chosen], normals[chosen], apart[chosen], strict=True)
+        ]
+
+    def alike(
+        self, members: tuple[str, str], one: tuple[float, float], other: tuple[float, float], distance: float
+    ) -> bool:
+        """Whether two places on a pair of members are as good as one."""
+        along = (abs(p - r) * self.lengths[m] for p, r, m in zip(one, other, members, strict=True))
+        return max(along) < SAME * distance
+
+    def shape(
+        self, fields: Fields, contact: str, members: tuple[str, str], at: tuple[float, float]
+    ) -> tuple[Array, float]:
+        """Slopes (2,) of the distance by both arc lengths at a place, and its least curvature times the distance."""
+        slope, curvature, apart, _ = self._distance(fields, Pair(contact, members, 0.0), np.array(at)[:, None])
+        return slope[:, 0], float(np.linalg.eigvalsh(curvature[:, :, 0])[0] * apart[0])
+
+    def _distance(self, fields: Fields, pair: Pair, at: Array) -> tuple[Array, Array, Array, Array]:
+        """Slope (2, n) and curvature (2, 2, n) of the distance by both arc lengths, distance (n,), normals (n, 3)."""
+        a, b = pair.members
+        r = [fields.positions(m, x) for m, x in zip((a, b), at, strict=True)]
+        t = [fields.tangents(m, x) for m, x in zip((a, b), at, strict=True)]
+        k = [self._curvature(fields, m, x) for m, x in zip((a, b), at, strict=True)]
+        between = r[0] - r[1]
+        apart = np.maximum(np.linalg.norm(between, axis=1), TINY)
+        n = between / apart[:, None]
+        along = np.stack([np.einsum("ni,ni->n", t[0], n), -np.einsum("ni,ni->n", t[1], n)])
+        both = np.einsum("ni,ni->n", t[0], t[1])
+        curvature = np.empty((2, 2, len(apart)))
+        curvature[0, 0] = (1.0 - along[0] ** 2) / apart + np.einsum("ni,ni->n", n, k[0])
+        curvature[1, 1] = (1.0 - along[1] ** 2) / apart - np.einsum("ni,ni->n", n, k[1])
+        curvature[0, 1] = curvature[1, 0] = (-both - along[0] * along[1]) / apart
+        return along, curvature, apart, n
+
+    def _curvature(self, fields: Fields, member: str, x: Array) -> Array:
+        """Vectors of curvature (n, 3) of a centre line, 1/m."""
+        low, high = np.maximum(x - BEND, 0.0), np.minimum(x + BEND, 1.0)
+        change = fields.tangents(member, high) - fields.tangents(member, low)
+        return np.asarray(change / ((high - low) * self.lengths[member])[:, None])
+
+
+def _downhill(slope: Array, curvature: Array, apart: Array, at: Array) -> Array:
+    """Steps (2, n) in both arc lengths, m, towards the minimum; none beyond an end of a member.
+
+    Downhill also where the distance is curved the other way, or not at all: of the curvatures the sizes are taken.
+    """
+    free = ~(((at <= 0.0) & (slope > 0.0)) | ((at >= 1.0) & (slope < 0.0)))
+    both = free.all(axis=0)
+    mean, half = 0.5 * (curvature[0, 0] + curvature[1, 1]), 0.5 * (curvature[0, 0] - curvature[1, 1])
+    across = np.where(both, curvature[0, 1], 0.0)
+    least, root = 1e-3 * FLAT / apart, np.hypot(half, across)
+    sizes = np.maximum(np.abs([mean + root, mean - root]), least)
+    angle = 0.5 * np.arctan2(across, half)
+    c, s = np.cos(angle), np.sin(angle)
+    first, second = (c * slope[0] + s * slope[1]) / sizes[0], (c * slope[1] - s * slope[0]) / sizes[1]
+    together = -np.array([c * first - s * second, s * first + c * second])
+    alone = -slope / np.maximum(np.abs([curvature[0, 0], curvature[1, 1]]), least)
+    return np.where(both, together, np.where(free, alone, 0.0))
+
+
+def _locally_least(i: Index, j: Index, distances: Array, columns: int) -> Array:
+    """Of pairs of pieces those that are not farther apart than any pair beside them."""
+    width = columns + 2
+    keys = (i + 1) * width + j + 1
+    order = np.argsort(keys)
+    ordered, values = keys[order], distances[order]
+    least = np.ones(len(keys), bool)
+    for di in (-1, 0, 1):
+        for dj in (-1, 0, 1):
+            if di or dj:
+                wanted = keys + di * width + dj
+                place = np.clip(np.searchsorted(ordered, wanted), 0, len(ordered) - 1)
+                beside = np.where(ordered[place] == wanted, values[place], np.inf)
+                least &= distances <= beside
+    return least
+
+
+def _closest_on_pieces(p: Array, p_end: Array, r: Array, r_end: Array) -> tuple[Array, Array, Array]:
+    """Where straight pieces (n, 3) are nearest to each other, fractions (n,) of both, and the distance (n,).
+
+    Source: Ericson 2005, Real-Time Collision Detection, section 5.1.9.
+    """
+    d1, d2, w = p_end - p, r_end - r, p - r
+    a, e = np.einsum("ni,ni->n", d1, d1), np.einsum("ni,ni->n", d2, d2)
+    b, c, f = np.einsum("ni,ni->n", d1, d2), np.einsum("ni,ni->n", d1, w), np.einsum("ni,ni->n", d2, w)
+    det = a * e - b * b
+    # Pieces in one direction are nearest all along: their middles stand for them.
+    parallel = det <= 1e-12 * a * e
+    s = np.where(parallel, 0.5, np.clip((b * f - c * e) / np.where(parallel, 1.0, det), 0.0, 1.0))
+    t = np.clip((b * s + f) / np.maximum(e, TINY), 0.0, 1.0)
+    s = np.clip((b * t - c) / np.maximum(a, TINY), 0.0, 1.0)
+    return s, t, np.linalg.norm(w + s[:, None] * d1 - t[:, None] * d2, axis=1)
+
+
+def answers(fields: Fields) -> dict[str, dict[str, Any]]:
+    """For each contact between members the ``force`` (3,) N on the first one, ``at``, ``gap`` in m, ``member``, and of
+    the second one ``other`` and ``other_at``; lists where members touch at several places.
+    """
+    closest, found = Closest(fields.model.scene), dict[str, dict[str, Any]]()
+    for name in dict.fromkeys(pair.contact for pair in closest.pairs):
+        points = sorted((p for p in fields.model.mesh.points if p.contact == name), key=lambda p: (p.members, p.at))
+        if not points:
+            pairs = [pair for pair in closest.pairs if pair.contact == name]
+            near = closest.found(fields, NEARBY * fields.model.scene.size, pairs)
+            gap = min((one.gap for one in near), default=None)
+            found[name] = {
+                "force": np.zeros(3),
+                "at": None,
+                "gap": gap,
+                "member": None,
+                "other": None,
+                "other_at": None,
+            }
+            continue
+        entries = []
+        for point in points:
+            told = fields.contact_point(point)
+            (first, second), (s, t) = point.members, told["at"]
+            apart = fields.positions(first, np.array([s]))[0] - fields.positions(second, np.array([t]))[0]
+            gap = float(np.linalg.norm(apart)) - point.distance
+            place = {"force": told["force"], "at": s, "gap": gap, "member": first}
+            entries.append({**place, "other": second, "other_at": t})
+        found[name] = entries[0] if len(entries) == 1 else {key: [e[key] for e in entries] for key in entries[0]}
+    return found
+
+
+NEARBY = 1.0
+"""Distance up to which the gap of members that do not touch is told, in sizes of the scene."""

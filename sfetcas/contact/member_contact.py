@@ -1,0 +1,444 @@
+"""Equilibria in which members touch each other: which points touch, and the way of the loads from zero.
+
+At given points of contact an equilibrium is a solution of one system, in which the places of the points are unknowns
+and the gaps rows, see :mod:`~sfetcas.mechanics.contact_points`.  Which points there are is found by an active set:
+where members penetrate a point is added, where they would pull each other it is removed, until neither is left.  A new
+point first stays where it is and pushes along a given normal; once its force is known it slides.
+
+The loads are followed from zero in steps so short that no member passes through another one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .. import tolerances
+from ..description.scene import Scene
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from ..mechanics.accuracy import roughness
+from ..mechanics.equations import State
+from ..mechanics.fields import Fields, transferred
+from ..mechanics.loading import Loading
+from ..mechanics.mesh import ContactPoint, Mesh
+from ..mechanics.model import Model
+from ..solvers.continuation import JUMPED, near_factor
+from ..solvers.prepared import Prepared, Solved
+from ..solvers.pseudo_transient import Drag
+from .closest import Closest, Near
+
+__all__ = ["MemberContact"]
+
+Points = tuple[ContactPoint, ...]
+Way = Callable[[Model], Loading]
+"""The loading of a model."""
+
+ROUNDS = 30
+"""Changes of the points at one loading, at most."""
+
+LINE = 3
+"""Number of points of a pair of members from which on it is taken for a line where two are within half an element."""
+
+TURN, ITERATIONS = 0.6, 30
+"""Largest rotation of a node in a step of Newton's method but the first, rad, and steps at most."""
+
+STRIDE = 0.5
+"""Largest rotation in a step of the way, rad: members between are then near to where they are at its ends."""
+
+FIRST, SHORTEST, AIM = 0.25, 2.0**-14, 0.7
+"""First and shortest step, parts of the way; share of a stride that steps aim at."""
+
+NARROW = 2.0**-8
+"""Step below which a loss of stability is taken for located, part of the way."""
+
+LASTING = 1e-9
+"""Share of the largest contact force up to which a force of the wrong sign is rounding."""
+
+ALLOWED = 1e-3
+"""Largest penetration over the sum of the radii, whatever accuracy is asked for."""
+
+ROUGH, REFINED = 0.05, 8
+"""Roughness, see :func:`~sfetcas.mechanics.accuracy.roughness`, from which elements are divided on the way, as what is
+unstable on a coarse mesh may be stable; divisions at one state at most.
+"""
+
+NUDGE = 0.02
+"""Rotation, rad, by which an unstable state is moved along its unstable mode."""
+
+FALLS, DRAGS, RESTS = 80, (1.0, 1e-6, 1e6), 1e-6
+"""Steps of a fall at most; first, least and largest drag; rotation in a step, rad, below which it has come to rest."""
+
+MOST_FALLS = 12
+"""Unstable states on a way that are left, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A state on a way from one loading to another."""
+
+    part: float
+    solved: Solved
+
+
+class MemberContact:
+    """Equilibria of a scene in which members touch each other.
+
+    Parameters
+    ----------
+    scene : Scene
+    prepare : callable
+        Mesh -> Prepared.
+    accuracy : float
+        Wanted error of the positions over the size of the scene.
+    fixed : collection of str
+        Members whose mesh is prescribed.
+
+    Attributes
+    ----------
+    closest : Closest
+    tolerance : float
+        Penetration that is accepted, m.
+    lines : set
+        Contacts and pairs of members that touch along lines, at nodes of the first one.
+    """
+
+    def __init__(
+        self, scene: Scene, prepare: Callable[[Mesh], Prepared], accuracy: float, fixed: Collection[str]
+    ) -> None:
+        self.scene, self.prepare, self.fixed = scene, prepare, fixed
+        self.closest = Closest(scene)
+        radii = min((pair.distance for pair in self.closest.pairs), default=np.inf)
+        self.tolerance = min(max(0.1 * accuracy, tolerances.CLOSED) * scene.size, ALLOWED * radii)
+        self.leaves = scene.analysis.unstable == "leave"
+        self.jumps: list[float] = []
+        self.lines: set[tuple[str, tuple[str, str]]] = set()
+
+    # -- begin ------------------------------------------------------------------------------------
+
+    def refuse_penetrating(self, fields: Fields) -> None:
+        """Refuse members that penetrate each other in the undeformed scene.
+
+        Raises
+        ------
+        SceneError
+            Names them, where and how deep.
+        """
+        deep = [near for near in self.closest.found(fields, 0.0) if near.gap < -max(self.tolerance, 1e-9 * near.apart)]
+        for near in sorted(deep, key=lambda one: one.gap)[:1]:
+            (a, b), (s, t) = near.members, near.at
+            found = f"members {a!r} and {b!r} penetrate" if a != b else f"member {a!r} penetrates itself"
+            where = f"at {s:.4g} and {t:.4g} of their lengths" if a != b else f"at {s:.4g} and {t:.4g} of its length"
+            message = f"{found} by {-near.gap:.3g} m {where} in the undeformed scene, accepted: members that do not"
+            raise SceneError(message, ("contacts", near.contact))
+
+    def clear(self, fields: Fields) -> bool:
+        """Whether no members penetrate each other."""
+        return not any(near.gap < -self.tolerance for near in self.closest.found(fields, 0.0))
+
+    def unstopped(self, before: Solved, after: Solved) -> bool:
+        """Whether members neither penetrate nor pass each other from one state to another."""
+        return self.clear(after.fields) and not self.passed(before.fields, after.fields)
+
+    # -- one loading ------------------------------------------------------------------------------
+
+    def solved(
+        self, mesh: Mesh, points: Points, source: Solved, way: Way, since: Solved | None = None, drag: float = 0.0
+    ) -> Solved | None:
+        """The equilibrium with given points from a near state; None if Newton's method does not converge.
+
+        With ``drag`` rotations since another state are resisted, see :class:`~sfetcas.solvers.pseudo_transient.Drag`.
+        """
+        points = tuple(replace(point, number=i) for i, point in enumerate(points))
+        prepared = self.prepare(replace(mesh, points=points))
+        loading = way(prepared.model)
+        state = self._carried(source, prepared)
+        resisting = None
+        if since is not None:
+            resisting = Drag(prepared.equations, transferred(since.model, since.state, prepared.model), drag)
+        found = prepared.correct(state, loading, iterations=ITERATIONS, most=TURN, contraction=2.0, drag=resisting)
+        good = found.converged or found.residual <= tolerances.BALANCED
+        return found if good else None
+
+    def _carried(self, source: Solved, prepared: Prepared) -> State:
+        """A state as the start on another mesh or with other points, which begin where they are now."""
+        target, before = prepared.model, source.model
+        state = transferred(before, source.state, target)
+        y, lam = state.y.copy(), np.zeros_like(state.lam)
+        numbers = {name: i for i, name in enumerate(target.positions.unknowns)}
+        known = {name: i for i, name in reversed(list(enumerate(before.row_names)))}
+        # Points have other numbers than before: rows of points by what they are, all others by their names.
+        others = [i for i, name in enumerate(target.row_names) if not name.startswith("contacts.")]
+        lam[others] = state.lam[others]
+        rows = {name: i for i, name in reversed(list(enumerate(target.row_names)))}
+        unit, axes = target.scales.length, target.element.axes
+        for point in target.mesh.points:
+            lines = [self.scene.center_lines[member] for member in point.members]
+            start = [line.positions(np.array([at]))[0] for line, at in zip(lines, point.at, strict=True)]
+            now = [source.fields.positions(m, np.array([at]))[0] for m, at in zip(point.members, point.at, strict=True)]
+            change = ((now[0] - now[1]) - (start[0] - start[1])) / unit
+            for k in range(axes):
+                y[numbers[f"{point.between}, {'xyz'[k]}"]] = change[k]
+            for side in (0, 1):
+                if point.slides[side]:
+                    y[numbers[f"{point.place(side)}, arc length"]] = 0.0
+            former = self._former(before, source, point)
+            if former is not None:
+                for one, other in zip(former.rows(axes), point.rows(axes), strict=True):
+                    lam[rows[other]] = source.state.lam[known[one]]
+        return replace(state, y=y, lam=lam)
+
+    @staticmethod
+    def _former(before: Model, source: Solved, point: ContactPoint) -> ContactPoint | None:
+        """The point of a state that a point continues; None for a new one."""
+        if point.normal is not None:
+            return None
+        for other in before.mesh.points:
+            at = source.fields.contact_point(other)["at"]
+            if (other.contact, other.members) == (point.contact, point.members) and np.allclose(
+                at, point.at, rtol=0.0, atol=1e-9
+            ):
+                return other
+        return None
+
+    def resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float = 0.0) -> Solved | None:
+        """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found."""
+        tried: set[object] = set()
+        since = source
+        for _ in range(ROUNDS):
+            found = self.solved(mesh, points, source, way, since if drag else None, drag)
+            if found is None:
+                return None
+            lined = self._with_lines(found)
+            points, change = (lined, True) if lined is not None else self._changed(found, tried)
+            if not change:
+                return found
+            source = found
+        return None
+
+    def _changed(self, found: Solved, tried: set[object]) -> tuple[Points, bool]:
+        """The points to try next, where they are now, and whether they are others than before."""
+        fields, points = found.fields, found.model.mesh.points
+        told = [fields.contact_point(point) for point in points]
+        now = [replace(point, at=entry["at"]) for point, entry in zip(points, told, strict=True)]
+        pushes = np.array([entry["push"] for entry in told])
+        wrong = pushes < -LASTING * np.abs(pushes).max(initial=0.0) - 1e-12 * found.model.scales.force
+        kept = [point for point, off in zip(now, wrong, strict=True) if not off]
+        more = self._penetrating(fields, kept)
+        key = frozenset((p.contact, p.members, round(p.at[0], 9)) for p in (*kept, *more))
+        if key in tried and (wrong.any() or more):
+            # All at once is faster; where that goes round, one after the other.
+            worst = int(np.argmin(pushes)) if wrong.any() else -1
+            kept = [point for i, point in enumerate(now) if i != worst]
+            more = () if wrong.any() else more[:1]
+        if wrong.any() or more:
+            tried.add(key)
+            return (*(self._freed(fields, point) for point in kept), *more), True
+        kept = self._merged(now, pushes)
+        freed = tuple(self._freed(fields, point) for point in kept)
+        return freed, freed != tuple(now)
+
+    def _merged(self, points: list[ContactPoint], pushes: Array) -> list[ContactPoint]:
+        """The points without those that have slid to where another one is."""
+        kept: list[ContactPoint] = []
+        for i in np.argsort(-pushes, kind="stable").tolist():
+            point = points[i]
+            if (point.contact, point.members) in self.lines or not any(self._same(point, other) for other in kept):
+                kept.append(point)
+        return [point for point in points if point in kept]
+
+    def _same(self, point: ContactPoint | Near, other: ContactPoint, share: float = 0.2) -> bool:
+        if (point.contact, point.members) != (other.contact, other.members):
+            return False
+        return self.closest.alike(point.members, point.at, other.at, share * other.distance)
+
+    def _freed(self, fields: Fields, point: ContactPoint) -> ContactPoint:
+        """A point as it slides from where it is, though not beyond ends; along a line it stays on the first member."""
+        at = (min(max(point.at[0], 0.0), 1.0), min(max(point.at[1], 0.0), 1.0))
+        if at != point.at:
+            slides = (point.slides[0] and at[0] == point.at[0], point.slides[1] and at[1] == point.at[1])
+            return replace(point, at=at, slides=slides, normal=None)
+        free = [0.0 < x < 1.0 for x in at]
+        if not all(free):
+            slopes, _ = self.closest.shape(fields, point.contact, point.members, at)
+            # At an end a point goes inwards where that is nearer.
+            free = [0.0 < x < 1.0 or (0.5 - x) * slope < 0.0 for x, slope in zip(at, slopes, strict=True)]
+        slides = (free[0] and (point.contact, point.members) not in self.lines, free[1])
+        return point if point.normal is None and slides == point.slides else replace(point, slides=slides, normal=None)
+
+    def _penetrating(self, fields: Fields, points: list[ContactPoint]) -> Points:
+        """New points where members penetrate each other, the deepest first."""
+        found: list[Near] = []
+        for pair in self.closest.pairs:
+            if (pair.contact, pair.members) in self.lines:
+                x = fields.model.mesh.cuts[pair.members[0]]
+                known = {p.at[0] for p in points if (p.contact, p.members) == (pair.contact, pair.members)}
+                near = self.closest.beside(fields, pair, x, 0.0)
+                found += [
+                    one for one in near if one.at[0] not in known and one.gap < -tolerances.DECIMAL * one.distance
+                ]
+        others = [pair for pair in self.closest.pairs if (pair.contact, pair.members) not in self.lines]
+        for one in self.closest.found(fields, 0.0, others):
+            if one.gap < -self.tolerance and not any(self._same(one, point) for point in points):
+                found.append(one)
+        return tuple(_begun(one) for one in sorted(found, key=lambda one: one.gap))
+
+    def _with_lines(self, found: Solved) -> Points | None:
+        """The points where a pair that touches at many places is taken for a line from now on; None where none is."""
+        model, points = found.model, self.points(found)
+        for pair in self.closest.pairs:
+            key, first = (pair.contact, pair.members), pair.members[0]
+            places = sorted(p.at[0] for p in points if (p.contact, p.members) == key)
+            if key in self.lines or len(places) < LINE or self.scene.members[first].type == "rigid":
+                continue
+            longest = float(np.diff(model.mesh.cuts[first]).max())
+            if float(np.diff(places).min()) >= 0.5 * longest:
+                continue
+            self.lines.add(key)
+            x = model.mesh.cuts[first]
+            near = self.closest.beside(found.fields, pair, x, 0.1 * pair.distance)
+            inside = [one for one in near if places[0] - longest < one.at[0] < places[-1] + longest]
+            others = tuple(point for point in points if (point.contact, point.members) != key)
+            return (*others, *map(_begun, inside))
+        return None
+
+    # -- steps ------------------------------------------------------------------------------------
+
+    def passed(self, before: Fields, after: Fields) -> bool:
+        """Whether a member may have passed through another one between two states.
+
+        What was nearest before, and is nearest after, must not have changed sides.
+        """
+        moved = 0.0
+        for member in self.closest.members:
+            x = self.closest.samples(after, member)
+            apart = after.positions(member, x) - before.positions(member, x)
+            moved = max(moved, float(np.linalg.norm(apart, axis=1).max()))
+        reach = 2.0 * moved
+        return any(
+            self._crossed(near, other)
+            for one, other in ((before, after), (after, before))
+            for near in self.closest.found(one, reach)
+        )
+
+    @staticmethod
+    def _crossed(near: Near, fields: Fields) -> bool:
+        first, second = (fields.positions(m, np.array([x]))[0] for m, x in zip(near.members, near.at, strict=True))
+        return bool(near.normal @ (first - second) <= 0.0)
+
+    def turned(self, before: Fields, after: Fields) -> float:
+        """Largest angle between tangents of the same place in two states, rad."""
+        most = 1.0
+        for member in after.model.members:
+            x = np.linspace(0.0, 1.0, 33)
+            most = min(most, float(np.einsum("ni,ni->n", before.tangents(member, x), after.tangents(member, x)).min()))
+        return float(np.arccos(np.clip(most, -1.0, 1.0)))
+
+    def unstable(self, found: Solved) -> bool:
+        """Whether a state is unstable, and the scene asks to leave such states."""
+        return self.leaves and found.model.minimisable and found.negative > 0
+
+    def follow(self, mesh: Mesh, way: Callable[[float], Way], start: Solved) -> Solved | None:
+        """The state at the end of a way, ``way(1)``, from its begin; None if it is lost."""
+        self.jumps, falls = [], 0
+        now, step = _Step(0.0, start), FIRST
+        while now.part < 1.0:
+            part = min(1.0, now.part + step)
+            points = self.points(now.solved)
+            there = self.resolved(mesh, points, now.solved, way(part))
+            if there is not None and (
+                self.turned(now.solved.fields, there.fields) > STRIDE or self.passed(now.solved.fields, there.fields)
+            ):
+                there = None
+            there = None if there is None else self._refined(there, way(part))
+            mesh = mesh if there is None else replace(there.model.mesh, points=())
+            turned = 0.0 if there is None else self.turned(now.solved.fields, there.fields)
+            falling = there is not None and self.unstable(there)
+            if there is None or (falling and step > NARROW):
+                step = 0.5 * (part - now.part)
+                if step >= SHORTEST:
+                    continue
+                if there is None:
+                    return None
+            assert there is not None
+            if falling:
+                falls += 1
+                rest = self.fallen(mesh, there, way(part)) if falls <= MOST_FALLS else None
+                if rest is None:
+                    return None
+                self.jumps.append(part)
+                there = rest
+            # As long as turns by a little less than a stride.
+            longer = min(2.0, AIM * STRIDE / max(turned, 0.1 * STRIDE))
+            now, step = _Step(part, there), longer * (part - now.part) if not falling else FIRST
+        return now.solved
+
+    def _refined(self, found: Solved, way: Way) -> Solved | None:
+        """The state on a mesh that is fine enough for what is decided on the way; None if it is not found there."""
+        for _ in range(REFINED):
+            rough, model = roughness(found.fields) > ROUGH, found.model
+            marks = {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
+            if not any(marked.any() for marked in marks.values()):
+                return found
+            mesh = replace(model.mesh.refined(marks, found.fields.kinks), points=())
+            finer = self.resolved(mesh, self.points(found), found, way)
+            if finer is None or self.turned(found.fields, finer.fields) > STRIDE:
+                return None
+            found = finer
+        return found
+
+    @staticmethod
+    def points(found: Solved) -> Points:
+        """The points of a state, where they are now."""
+        return tuple(replace(point, at=found.fields.contact_point(point)["at"]) for point in found.model.mesh.points)
+
+    def fallen(self, mesh: Mesh, found: Solved, way: Way) -> Solved | None:
+        """Where an unstable state falls to through something viscous; None where it does not come to rest."""
+        now = self._nudged(found)
+        first, least, largest = DRAGS
+        deep = max(-found.stability.smallest, 0.0)
+        drag = max(first, 4.0 * deep)
+        for _ in range(FALLS):
+            there = self.resolved(mesh, self.points(now), now, way, drag)
+            turned = np.inf if there is None else self.turned(now.fields, there.fields)
+            if there is None or turned > STRIDE or self.passed(now.fields, there.fields):
+                drag *= 4.0
+                if drag > largest * max(deep, 1.0):
+                    return None
+                continue
+            now = there
+            if turned < 0.1:
+                rest = self.resolved(mesh, self.points(now), now, way)
+                if rest is not None and self._stays(now, rest):
+                    return rest
+            drag = max(0.3 * drag, least)
+        return None
+
+    def _stays(self, now: Solved, rest: Solved) -> bool:
+        near = self.turned(now.fields, rest.fields) < STRIDE and not self.passed(now.fields, rest.fields)
+        return near and rest.negative == 0
+
+    @staticmethod
+    def _nudged(found: Solved) -> Solved:
+        """An unstable state moved along its unstable mode."""
+        prepared, loading = found.prepared, found.loading
+        state = prepared.nudged(found, loading, NUDGE)
+        return replace(found, state=state, point=prepared.equations.at(state, loading))
+
+    def factors(self, begin: float, end: float) -> list[float]:
+        """Factors from one to another, where histories have knots."""
+        low, high = min(begin, end), max(begin, end)
+        knots = {t for history in self.scene.histories.values() for t in history.knots if low < t < high}
+        return [begin, *sorted(knots, reverse=end < begin), end]
+
+    def notes(self, begin: float, end: float) -> tuple[str, ...]:
+        """What is said of the last way, between two factors."""
+        return tuple(f"jumped {near_factor(begin + part * (end - begin))}: {JUMPED}" for part in self.jumps)
+
+
+def _begun(near: Near) -> ContactPoint:
+    """A point that begins where members are nearest to each other."""
+    normal = (float(near.normal[0]), float(near.normal[1]), float(near.normal[2]))
+    return ContactPoint(near.contact, near.members, near.at, (False, False), near.distance, normal=normal)

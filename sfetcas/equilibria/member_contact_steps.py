@@ -1,0 +1,167 @@
+"""Load steps of scenes in which members touch each other: the way to each, and its mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..contact.member_contact import MemberContact
+from ..errors import LIMITS, SolveError, Status
+from ..mechanics.accuracy import roughness
+from ..mechanics.loading import Loading
+from ..mechanics.mesh import Mesh
+from ..mechanics.model import Model
+from ..solvers.prepared import Prepared, Solved
+from .force_balance import refuse_lost_forces
+from .meshing import Meshing
+from .refinement import LEVELS, MOST_ELEMENTS, Refinement
+from .single import finished, unjudged
+from .solution import Equilibrium, refuse_large
+from .ways import NO_ENERGY, Ways
+
+__all__ = ["MemberContactSteps"]
+
+
+class MemberContactSteps:
+    """The load steps of a scene in which members may touch each other, one after the other.
+
+    Parameters
+    ----------
+    meshes, ways, refinement
+        Of the scene, see :class:`~sfetcas.equilibria.statics.LoadSteps`.
+    """
+
+    def __init__(self, meshes: Meshing, ways: Ways, refinement: Refinement) -> None:
+        self.meshes, self.ways, self.refinement, self.scene = meshes, ways, refinement, meshes.scene
+        self.run = MemberContact(self.scene, meshes.prepared, meshes.accuracy, meshes.fixed)
+        self.last: tuple[float, Solved] | None = None
+        self.checked = False
+
+    def answer(self, pilot: Prepared, factor: float) -> Equilibrium:
+        """The equilibrium at a load factor.
+
+        Raises
+        ------
+        SceneError, SolveError
+            Members penetrate each other in the undeformed scene; no equilibrium was found.
+        """
+        zero = self._undeformed(pilot)
+        if not self.checked:
+            self.run.refuse_penetrating(zero.fields)
+            self.checked = True
+        if self.last is None:
+            alone = self._alone(pilot, factor)
+            if alone is not None:
+                return alone
+        notes: tuple[str, ...] = () if pilot.model.conservative else (NO_ENERGY,)
+        found, more = self._reached(pilot, factor, zero)
+        self.last = (factor, found)
+        return self._refined(found, factor, (*notes, *more))
+
+    @staticmethod
+    def _undeformed(pilot: Prepared) -> Solved:
+        nothing = pilot.model.loading(0.0, 0.0)
+        state = pilot.equations.start(nothing)
+        return Solved(pilot, state, nothing, pilot.equations.at(state, nothing), 0.0)
+
+    def _alone(self, pilot: Prepared, factor: float) -> Equilibrium | None:
+        """The answer in which nothing touches, where the growing loads lead there; else None."""
+        try:
+            found = self.ways.grown_from_zero(pilot, factor, self.run.unstopped)
+        except SolveError as error:
+            if error.status in LIMITS:
+                raise
+            return None
+        if found is None or (self.meshes.switch_branch and found.stability.negative > 0):
+            return None
+        answer = self.refinement.refined(replace(found, way=("no contact",)))
+        return answer if self.run.clear(answer.fields) else None
+
+    def _reached(self, pilot: Prepared, factor: float, zero: Solved) -> tuple[Solved, tuple[str, ...]]:
+        """The state that the loads lead to, from the last factor where that lies on the way, and notes on it."""
+        begin, start, mesh = 0.0, zero, pilot.model.mesh
+        if self.last is not None and self.last[0] * (factor - self.last[0]) >= 0.0:
+            begin, start = self.last
+            mesh = replace(start.model.mesh, points=())
+        elif self.scene.histories:
+            found = self.run.follow(mesh, lambda t: lambda model: model.loading(0.0, t), zero)
+            start = self._known(found, factor)
+        elif pilot.lacks_slack or pilot.diagnosis.mobility:
+            bent = self.ways.bent(pilot, factor)
+            if bent is not None and self.run.unstopped(zero, bent):
+                begin, start = bent.factor, bent
+        notes: tuple[str, ...] = ()
+        stops = self.run.factors(begin, factor)
+        for a, b in zip(stops, stops[1:], strict=False):
+            start = self._known(self.run.follow(mesh, _between(a, b), start), factor)
+            notes += self.run.notes(a, b)
+        return start, notes
+
+    def _known(self, found: Solved | None, factor: float) -> Solved:
+        if found is None:
+            detail = "the loads growing from zero could not be followed while members touch each other"
+            raise SolveError(
+                Status.FAILED, f"{detail}: {', '.join(f'contacts.{name}' for name in self.scene.contacts)}"
+            )
+        return found
+
+    # -- accuracy -------------------------------------------------------------------------------
+
+    def _refined(self, found: Solved, factor: float, notes: tuple[str, ...]) -> Equilibrium:
+        """The answer on a mesh that is fine enough for the accuracy."""
+        target, accuracy = self.meshes.target, self.meshes.accuracy
+        now = found
+        if now.model.mesh.order != target.order or self.meshes.fixed:
+            mesh = target if self.meshes.fixed else replace(now.model.mesh, order=target.order)
+            now = self._onto(mesh, now, factor)
+        smooth, error = np.sqrt(accuracy), np.inf
+        for _ in range(LEVELS):
+            rough, model = roughness(now.fields) > smooth, now.model
+            marks = {n: rough[model.elements_of(n)] & (n not in self.meshes.fixed) for n in model.members}
+            if any(marked.any() for marked in marks.values()):
+                if model.mesh.elements > MOST_ELEMENTS:
+                    break
+                now = self._onto(model.mesh.refined(marks, now.fields.kinks), now, factor)
+                continue
+            finer = self._onto(model.mesh.refined(None, now.fields.kinks), now, factor)
+            difference, error = self.meshes.judged(unjudged(now), unjudged(finer))
+            if self.meshes.prescribed:
+                error += difference
+                break
+            now = finer
+            if error <= accuracy:
+                break
+            smooth *= 0.1
+        refuse_large(now.fields)
+        stability = now.stability
+        more: dict[str, Any] = {"error_estimate": error, "error_of": self.meshes.error_of}
+        answer = finished(now, stability, notes=notes, way=("in contact",), **more)
+        refuse_lost_forces(answer)
+        return answer
+
+    def _onto(self, mesh: Mesh, found: Solved, factor: float) -> Solved:
+        """The same state on another mesh.
+
+        Raises
+        ------
+        SolveError
+            It is not found there.
+        """
+        points = self.run.points(found)
+        there = self.run.resolved(replace(mesh, points=()), points, found, lambda model: model.loading(factor))
+        if there is None or self.run.turned(found.fields, there.fields) > 0.5:
+            detail = "what touches on a coarse mesh was not found on a finer one"
+            raise SolveError(Status.FAILED, detail, found.state)
+        return there
+
+
+def _between(a: float, b: float) -> Callable[[float], Callable[[Model], Loading]]:
+    """The way of the loads from one factor to another."""
+
+    def way(part: float) -> Callable[[Model], Loading]:
+        return lambda model: model.loading(a + part * (b - a))
+
+    return way
