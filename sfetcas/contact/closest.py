@@ -22,21 +22,19 @@ from ..description.scene import Scene
 from ..mathematics.arrays import TINY, Array, Index
 from ..mechanics.fields import Fields
 
-__all__ = ["FLAT", "Closest", "Near", "Pair", "answers"]
+__all__ = ["Closest", "Near", "Pair", "answers"]
 
 PIECES = 4
 """Straight pieces of an element at least."""
 
-SLENDER = 6.0
+SLENDER = 1.0
 """Length of a piece at most, over the radius of its member: chains then find minima one radius apart."""
 
-MOST_PIECES = 4_000
+MOST_PIECES = 1_000
 """Straight pieces of a member at most, for which slender ones are longer."""
 
-FLAT = 1e-3
-"""Least curvature of the distance, over that of a circle of this radius, at which a minimum is a point; below it lines
-touch, and the place on the first of them stays.
-"""
+LEAST = 1e-6
+"""Least curvature of the distance, over that of a circle of this radius, with which Newton's steps are made."""
 
 BEND = 1e-6
 """Fraction of a length over which tangents are differenced for the curvature of a centre line."""
@@ -241,7 +239,7 @@ class Closest:
         length = self.lengths[second]
         for _ in range(ITERATIONS):
             slope, curvature, apart, _ = self._distance(fields, pair, at)
-            step = -slope[1] / np.maximum(np.abs(curvature[1, 1]), 1e-3 * FLAT / apart)
+            step = -slope[1] / np.maximum(np.abs(curvature[1, 1]), LEAST / apart)
             step = np.clip(step, -self.largest, self.largest) / length
             after = np.clip(at[1] + step, 0.0, 1.0)
             moved, at[1] = np.abs(after - at[1]).max(), after
@@ -303,7 +301,7 @@ def _downhill(slope: Array, curvature: Array, apart: Array, at: Array) -> Array:
     both = free.all(axis=0)
     mean, half = 0.5 * (curvature[0, 0] + curvature[1, 1]), 0.5 * (curvature[0, 0] - curvature[1, 1])
     across = np.where(both, curvature[0, 1], 0.0)
-    least, root = 1e-3 * FLAT / apart, np.hypot(half, across)
+    least, root = LEAST / apart, np.hypot(half, across)
     sizes = np.maximum(np.abs([mean + root, mean - root]), least)
     angle = 0.5 * np.arctan2(across, half)
     c, s = np.cos(angle), np.sin(angle)

@@ -28,7 +28,7 @@ from ..mechanics.model import Model
 from ..solvers.continuation import JUMPED, near_factor
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
-from .closest import Closest, Near
+from .closest import Closest, Near, Pair
 
 __all__ = ["MemberContact"]
 
@@ -39,8 +39,8 @@ Way = Callable[[Model], Loading]
 ROUNDS = 30
 """Changes of the points at one loading, at most."""
 
-LINE = 3
-"""Number of points of a pair of members from which on it is taken for a line where two are within half an element."""
+LINE, SHORT = 3, 4.0
+"""Number of points of a pair of members from which on it is taken for a line, and parts into which that is divided."""
 
 TURN, ITERATIONS = 0.6, 30
 """Largest rotation of a node in a step of Newton's method but the first, rad, and steps at most."""
@@ -53,6 +53,9 @@ FIRST, SHORTEST, AIM = 0.25, 2.0**-14, 0.7
 
 NARROW = 2.0**-8
 """Step below which a loss of stability is taken for located, part of the way."""
+
+NEAREST = 1e-3
+"""Slope of the distance along a member up to which a place is taken for the nearest one."""
 
 LASTING = 1e-9
 """Share of the largest contact force up to which a force of the wrong sign is rounding."""
@@ -68,8 +71,10 @@ unstable on a coarse mesh may be stable; divisions at one state at most.
 NUDGE = 0.02
 """Rotation, rad, by which an unstable state is moved along its unstable mode."""
 
-FALLS, DRAGS, RESTS = 80, (1.0, 1e-6, 1e6), 1e-6
-"""Steps of a fall at most; first, least and largest drag; rotation in a step, rad, below which it has come to rest."""
+FALLS, DRAGS, BEYOND, SLOW = 80, (1.0, 1e-6, 1e6), 4.0, 0.1
+"""Steps of a fall at most; first, least and largest drag; drag over what makes a step unique; rotation in a step, rad,
+below which it is looked whether it has come to rest.
+"""
 
 MOST_FALLS = 12
 """Unstable states on a way that are left, at most."""
@@ -212,9 +217,12 @@ class MemberContact:
             if found is None:
                 return None
             lined = self._with_lines(found)
-            points, change = (lined, True) if lined is not None else self._changed(found, tried)
-            if not change:
-                return found
+            if lined is not None:
+                mesh, points = lined
+            else:
+                points, change = self._changed(found, tried)
+                if not change:
+                    return found
             source = found
         return None
 
@@ -224,7 +232,8 @@ class MemberContact:
         told = [fields.contact_point(point) for point in points]
         now = [replace(point, at=entry["at"]) for point, entry in zip(points, told, strict=True)]
         pushes = np.array([entry["push"] for entry in told])
-        wrong = pushes < -LASTING * np.abs(pushes).max(initial=0.0) - 1e-12 * found.model.scales.force
+        lost = np.array([self._lost(fields, point) for point in now], dtype=bool)
+        wrong = lost | (pushes < -LASTING * np.abs(pushes).max(initial=0.0) - 1e-12 * found.model.scales.force)
         kept = [point for point, off in zip(now, wrong, strict=True) if not off]
         more = self._penetrating(fields, kept)
         key = frozenset((p.contact, p.members, round(p.at[0], 9)) for p in (*kept, *more))
@@ -239,6 +248,13 @@ class MemberContact:
         kept = self._merged(now, pushes)
         freed = tuple(self._freed(fields, point) for point in kept)
         return freed, freed != tuple(now)
+
+    def _lost(self, fields: Fields, point: ContactPoint) -> bool:
+        """Whether a point is where members are not nearest: where it does not push, nothing else keeps it there."""
+        if not any(point.slides) or not all(0.0 <= x <= 1.0 for x in point.at):
+            return False
+        slopes, _ = self.closest.shape(fields, point.contact, point.members, point.at)
+        return bool(np.abs(slopes[list(point.slides)]).max() > NEAREST)
 
     def _merged(self, points: list[ContactPoint], pushes: Array) -> list[ContactPoint]:
         """The points without those that have slid to where another one is."""
@@ -273,35 +289,49 @@ class MemberContact:
         found: list[Near] = []
         for pair in self.closest.pairs:
             if (pair.contact, pair.members) in self.lines:
-                x = fields.model.mesh.cuts[pair.members[0]]
-                known = {p.at[0] for p in points if (p.contact, p.members) == (pair.contact, pair.members)}
-                near = self.closest.beside(fields, pair, x, 0.0)
-                found += [
-                    one for one in near if one.at[0] not in known and one.gap < -tolerances.DECIMAL * one.distance
-                ]
+                found += self._deepest(fields, pair, points)
         others = [pair for pair in self.closest.pairs if (pair.contact, pair.members) not in self.lines]
         for one in self.closest.found(fields, 0.0, others):
             if one.gap < -self.tolerance and not any(self._same(one, point) for point in points):
                 found.append(one)
         return tuple(_begun(one) for one in sorted(found, key=lambda one: one.gap))
 
-    def _with_lines(self, found: Solved) -> Points | None:
-        """The points where a pair that touches at many places is taken for a line from now on; None where none is."""
-        model, points = found.model, self.points(found)
+    def _deepest(self, fields: Fields, pair: Pair, points: list[ContactPoint]) -> list[Near]:
+        """Of ends of elements that penetrate those that do so more than the ones beside them: one by one of a line."""
+        cuts = fields.model.mesh.cuts[pair.members[0]]
+        known = {p.at[0] for p in points if (p.contact, p.members) == (pair.contact, pair.members)}
+        near = {one.at[0]: one for one in self.closest.beside(fields, pair, cuts, 0.0) if one.at[0] not in known}
+        gaps = np.array([near[x].gap if x in near else 0.0 for x in cuts.tolist()])
+        padded = np.concatenate([[0.0], gaps, [0.0]])
+        deep = (gaps <= padded[:-2]) & (gaps <= padded[2:]) & (gaps < -tolerances.DECIMAL * pair.distance)
+        return [near[x] for x in cuts[deep].tolist()]
+
+    def _with_lines(self, found: Solved) -> tuple[Mesh, Points] | None:
+        """Mesh and points where a pair that touches at many places is taken for a line from now on; None for none."""
+        points, mesh = self.points(found), replace(found.model.mesh, points=())
         for pair in self.closest.pairs:
             key, first = (pair.contact, pair.members), pair.members[0]
-            places = sorted(p.at[0] for p in points if (p.contact, p.members) == key)
-            if key in self.lines or len(places) < LINE or self.scene.members[first].type == "rigid":
+            own = [point for point in points if (point.contact, point.members) == key]
+            if self.scene.members[first].type == "rigid" or first in self.fixed:
                 continue
-            longest = float(np.diff(model.mesh.cuts[first]).max())
-            if float(np.diff(places).min()) >= 0.5 * longest:
+            if len(own) < LINE if key not in self.lines else not any(point.slides[0] for point in own):
                 continue
             self.lines.add(key)
-            x = model.mesh.cuts[first]
-            near = self.closest.beside(found.fields, pair, x, 0.1 * pair.distance)
-            inside = [one for one in near if places[0] - longest < one.at[0] < places[-1] + longest]
+            places = [point.at[0] for point in own]
+            length = self.scene.center_lines[first].length
+            longest = max((max(places) - min(places)) / SHORT, 0.5 * pair.distance / length)
+            low, high = min(places) - longest, max(places) + longest
+            while True:
+                cuts = mesh.cuts[first]
+                long = (np.diff(cuts) > longest) & (cuts[1:] > low) & (cuts[:-1] < high)
+                if not long.any():
+                    break
+                marks = {name: np.zeros(len(c) - 1, bool) for name, c in mesh.cuts.items()}
+                mesh = mesh.refined(marks | {first: long})
+            near = self.closest.beside(found.fields, pair, mesh.cuts[first], 0.1 * pair.distance)
+            inside = [one for one in near if low <= one.at[0] <= high]
             others = tuple(point for point in points if (point.contact, point.members) != key)
-            return (*others, *map(_begun, inside))
+            return mesh, (*others, *map(_begun, inside))
         return None
 
     # -- steps ------------------------------------------------------------------------------------
@@ -396,21 +426,31 @@ class MemberContact:
 
     def fallen(self, mesh: Mesh, found: Solved, way: Way) -> Solved | None:
         """Where an unstable state falls to through something viscous; None where it does not come to rest."""
-        now = self._nudged(found)
+        # Where points are on members is no part of the nudge: they are where members are nearest.
+        return self.relaxed(mesh, self._nudged(found), way, max(-found.stability.smallest, 0.0), self.points(found))
+
+    def relaxed(
+        self, mesh: Mesh, now: Solved, way: Way, deep: float = 0.0, points: Points | None = None
+    ) -> Solved | None:
+        """Where a state that is none of rest comes to rest in something viscous; None where it does not.
+
+        ``deep`` is minus its lowest eigenvalue, if that is below zero: drag beyond it leaves each step one minimum.
+        ``points`` are those to begin with, by default the points of the state.
+        """
+        points = self.points(now) if points is None else points
         first, least, largest = DRAGS
-        deep = max(-found.stability.smallest, 0.0)
-        drag = max(first, 4.0 * deep)
+        drag = max(first, BEYOND * deep)
         for _ in range(FALLS):
-            there = self.resolved(mesh, self.points(now), now, way, drag)
+            there = self.resolved(mesh, points, now, way, drag)
             turned = np.inf if there is None else self.turned(now.fields, there.fields)
             if there is None or turned > STRIDE or self.passed(now.fields, there.fields):
                 drag *= 4.0
                 if drag > largest * max(deep, 1.0):
                     return None
                 continue
-            now = there
-            if turned < 0.1:
-                rest = self.resolved(mesh, self.points(now), now, way)
+            now, points = there, self.points(there)
+            if turned < SLOW:
+                rest = self.resolved(mesh, points, now, way)
                 if rest is not None and self._stays(now, rest):
                     return rest
             drag = max(0.3 * drag, least)

@@ -24,6 +24,16 @@ from .ways import NO_ENERGY, Ways
 
 __all__ = ["MemberContactSteps"]
 
+NEAR = 0.5
+"""Rotation, rad, from mesh to mesh up to which a state is the same."""
+
+SMALL = 1e-3
+"""Share of the loads under which a mechanism falls to where members hold each other, which has no place without loads.
+"""
+
+LEFT = "left an equilibrium that is unstable on the fine mesh only"
+"""A note."""
+
 
 class MemberContactSteps:
     """The load steps of a scene in which members may touch each other, one after the other.
@@ -39,6 +49,7 @@ class MemberContactSteps:
         self.run = MemberContact(self.scene, meshes.prepared, meshes.accuracy, meshes.fixed)
         self.last: tuple[float, Solved] | None = None
         self.checked = False
+        self.moved: set[float] = set()
 
     def answer(self, pilot: Prepared, factor: float) -> Equilibrium:
         """The equilibrium at a load factor.
@@ -91,8 +102,12 @@ class MemberContactSteps:
             start = self._known(found, factor)
         elif pilot.lacks_slack or pilot.diagnosis.mobility:
             bent = self.ways.bent(pilot, factor)
-            if bent is not None and self.run.unstopped(zero, bent):
+            near = bent is not None and self.run.turned(zero.fields, bent.fields) < NEAR
+            if bent is not None and near and self.run.unstopped(zero, bent):
                 begin, start = bent.factor, bent
+            elif pilot.diagnosis.mobility:
+                begin = SMALL * factor
+                start = self._known(self.run.relaxed(mesh, zero, lambda model: model.loading(begin)), factor)
         notes: tuple[str, ...] = ()
         stops = self.run.factors(begin, factor)
         for a, b in zip(stops, stops[1:], strict=False):
@@ -136,6 +151,12 @@ class MemberContactSteps:
                 break
             smooth *= 0.1
         refuse_large(now.fields)
+        if self.run.unstable(now) and LEFT not in notes:
+            rest = self.run.fallen(replace(now.model.mesh, points=()), now, lambda model: model.loading(factor))
+            if rest is not None:
+                return self._refined(rest, factor, (*notes, LEFT))
+        if factor in self.moved and LEFT not in notes:
+            notes = (*notes, LEFT)
         stability = now.stability
         more: dict[str, Any] = {"error_estimate": error, "error_of": self.meshes.error_of}
         answer = finished(now, stability, notes=notes, way=("in contact",), **more)
@@ -150,9 +171,12 @@ class MemberContactSteps:
         SolveError
             It is not found there.
         """
-        points = self.run.points(found)
-        there = self.run.resolved(replace(mesh, points=()), points, found, lambda model: model.loading(factor))
-        if there is None or self.run.turned(found.fields, there.fields) > 0.5:
+        mesh, run = replace(mesh, points=()), self.run
+        there = run.resolved(mesh, run.points(found), found, lambda model: model.loading(factor))
+        if there is None or run.turned(found.fields, there.fields) > NEAR:
+            self.moved.add(factor)
+            there = run.relaxed(mesh, found, lambda model: model.loading(factor))
+        if there is None:
             detail = "what touches on a coarse mesh was not found on a finer one"
             raise SolveError(Status.FAILED, detail, found.state)
         return there
