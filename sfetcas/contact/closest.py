@@ -217,7 +217,8 @@ class Closest:
     def beside(self, fields: Fields, pair: Pair, stations: Array, reach: float) -> list[Near]:
         """Of places (n,) of the first member of a pair those at which the second one is nearer than ``reach``, m.
 
-        Where a member is beside itself each place counts with those that come later on it.
+        Beyond the ends of the second one there are none.  Where a member is beside itself each place counts with those
+        that come later on it.
         """
         first, second = pair.members
         x = self.samples(fields, second)
@@ -246,7 +247,7 @@ class Closest:
             if moved < ARRIVED:
                 break
         _, _, apart, normals = self._distance(fields, pair, at)
-        chosen = (apart < pair.distance + reach) & ~self._next_to(pair, *at)
+        chosen = (apart < pair.distance + reach) & ~self._next_to(pair, *at) & (at[1] > 0.0) & (at[1] < 1.0)
         if first == second:
             chosen &= at[0] < at[1]
         return [

@@ -163,7 +163,9 @@ class MemberContact:
         resisting = None
         if since is not None:
             resisting = Drag(prepared.equations, transferred(since.model, since.state, prepared.model), drag)
-        found = prepared.correct(state, loading, iterations=ITERATIONS, most=TURN, contraction=2.0, drag=resisting)
+        # What is lost may overflow before it is told to be.
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = prepared.correct(state, loading, iterations=ITERATIONS, most=TURN, contraction=2.0, drag=resisting)
         good = found.converged or found.residual <= tolerances.BALANCED
         return found if good else None
 
@@ -261,7 +263,7 @@ class MemberContact:
         kept: list[ContactPoint] = []
         for i in np.argsort(-pushes, kind="stable").tolist():
             point = points[i]
-            if (point.contact, point.members) in self.lines or not any(self._same(point, other) for other in kept):
+            if self._of_line(point) or not any(self._same(point, other) for other in kept):
                 kept.append(point)
         return [point for point in points if point in kept]
 
@@ -281,7 +283,7 @@ class MemberContact:
             slopes, _ = self.closest.shape(fields, point.contact, point.members, at)
             # At an end a point goes inwards where that is nearer.
             free = [0.0 < x < 1.0 or (0.5 - x) * slope < 0.0 for x, slope in zip(at, slopes, strict=True)]
-        slides = (free[0] and (point.contact, point.members) not in self.lines, free[1])
+        slides = (free[0] and not self._of_line(point), free[1])
         return point if point.normal is None and slides == point.slides else replace(point, slides=slides, normal=None)
 
     def _penetrating(self, fields: Fields, points: list[ContactPoint]) -> Points:
@@ -290,11 +292,15 @@ class MemberContact:
         for pair in self.closest.pairs:
             if (pair.contact, pair.members) in self.lines:
                 found += self._deepest(fields, pair, points)
-        others = [pair for pair in self.closest.pairs if (pair.contact, pair.members) not in self.lines]
-        for one in self.closest.found(fields, 0.0, others):
-            if one.gap < -self.tolerance and not any(self._same(one, point) for point in points):
+        for one in self.closest.found(fields, 0.0):
+            deep = one.gap < -self.tolerance and not self._of_line(one)
+            if deep and not any(self._same(one, point) for point in points if not self._of_line(point)):
                 found.append(one)
         return tuple(_begun(one) for one in sorted(found, key=lambda one: one.gap))
+
+    def _of_line(self, one: ContactPoint | Near) -> bool:
+        """Whether a place is one of those along a line: not where the second member ends, which slides on the first."""
+        return (one.contact, one.members) in self.lines and 0.0 < one.at[1] < 1.0
 
     def _deepest(self, fields: Fields, pair: Pair, points: list[ContactPoint]) -> list[Near]:
         """Of ends of elements that penetrate those that do so more than the ones beside them: one by one of a line."""
@@ -311,7 +317,7 @@ class MemberContact:
         points, mesh = self.points(found), replace(found.model.mesh, points=())
         for pair in self.closest.pairs:
             key, first = (pair.contact, pair.members), pair.members[0]
-            own = [point for point in points if (point.contact, point.members) == key]
+            own = [p for p in points if (p.contact, p.members) == key and 0.0 < p.at[1] < 1.0]
             if self.scene.members[first].type == "rigid" or first in self.fixed:
                 continue
             if len(own) < LINE if key not in self.lines else not any(point.slides[0] for point in own):
@@ -330,7 +336,7 @@ class MemberContact:
                 mesh = mesh.refined(marks | {first: long})
             near = self.closest.beside(found.fields, pair, mesh.cuts[first], 0.1 * pair.distance)
             inside = [one for one in near if low <= one.at[0] <= high]
-            others = tuple(point for point in points if (point.contact, point.members) != key)
+            others = tuple(point for point in points if point not in own)
             return mesh, (*others, *map(_begun, inside))
         return None
 
@@ -375,7 +381,7 @@ class MemberContact:
         self.jumps, falls = [], 0
         now, step = _Step(0.0, start), FIRST
         while now.part < 1.0:
-            part = min(1.0, now.part + step)
+            part, lines = min(1.0, now.part + step), set(self.lines)
             points = self.points(now.solved)
             there = self.resolved(mesh, points, now.solved, way(part))
             if there is not None and (
@@ -387,7 +393,8 @@ class MemberContact:
             turned = 0.0 if there is None else self.turned(now.solved.fields, there.fields)
             falling = there is not None and self.unstable(there)
             if there is None or (falling and step > NARROW):
-                step = 0.5 * (part - now.part)
+                # What was taken for a line on the way to a state that is not taken is none.
+                step, self.lines = 0.5 * (part - now.part), lines
                 if step >= SHORTEST:
                     continue
                 if there is None:

@@ -20,7 +20,7 @@ from ..mathematics.quaternion import matrix
 from .actuation import Actuation, Magnet, MagneticField
 from .answers import answer_name, check_answer
 from .changes import FACTOR, Branch, branch_of, carry_ends, with_entries
-from .contacts import Contact, contact_radius
+from .contacts import Contact, contact_radius, pairs_of
 from .dimension import out_of_plane
 from .formulas import Formula
 from .inserting import check_insertion, pushed, refuse_insertion
@@ -35,7 +35,7 @@ from .moving import (
     check_velocities,
 )
 from .obstacles import check_start, members_of, obstacle
-from .records import Named, Record, Vector, brief, counted, number, say, unknown
+from .records import Named, Record, Vector, brief, counted, enumerated, number, say, unknown
 from .remembering import check_memory, refuse_memory, remembering_section
 from .rings import Ring, begins_at, check_ring
 from .sections import CrossSection
@@ -1004,6 +1004,9 @@ def _check_between_members(scene: Scene, name: str) -> None:
         names = [member for member in names if scene.members[member].type != "small"]
     if len(names) != len(set(names)):
         raise SceneError("found a member twice, accepted: each once", (*where, "members"))
+    if not pairs_of(names, scene.members):
+        message = f"found {enumerated(names) or 'no member'}, accepted: two members or more, or one that is flexible"
+        raise SceneError(message, where)
     for member in names:
         record = scene.members[member]
         if record.type == "small":
