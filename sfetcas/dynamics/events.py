@@ -81,9 +81,9 @@ class Events:
         self.rows, self.signs = self.system.unilateral.rows, self.system.unilateral.signs
         self._impacts, self.found = Impacts(self.system), list[Event]()
         self._offset = np.zeros(len(self.rows))
-        # Times of events, and the times and speeds of impacts.
+        # Times of events; times and speeds of the last impacts, of all rows and of each.
         self._times: list[float] = []
-        self._hits: list[tuple[float, float]] = []
+        self._hits: dict[int, list[tuple[float, float]]] = {}
 
     # -- begin ----------------------------------------------------------------------------------------
 
@@ -134,10 +134,23 @@ class Events:
             detail = f"at {seconds:.9g} s one impact or release follows another, {MOST} of them, of {names}"
             raise SolveError(Status.STOPPED, detail, memory)
 
-    def _ebbs(self, t: float, speed: float) -> bool:
-        """Whether an impact is one of infinitely many that come ever closer: rows that it goes between stay closed."""
-        self._hits = [*self._hits[-REPEATED:], (t, speed)]
-        times, speeds = np.array(self._hits).T
+    def _ebbing(self, t: float, speeds: Array) -> Array:
+        """Rows (rows,) whose impacts are some of infinitely many that come ever closer: these stay closed.
+
+        Those are impacts of one row, or of several between which something goes to and fro.
+        """
+        hit = speeds > 0.0
+        if not hit.any():
+            return hit
+        if self._ebbs(ANY, t, float(speeds.max())):
+            return hit
+        own = [bool(hit[i]) and self._ebbs(i, t, float(speeds[i])) for i in range(len(hit))]
+        return np.array(own)
+
+    def _ebbs(self, row: int, t: float, speed: float) -> bool:
+        """Whether an impact of a row, or of any, is the last of a series that counts."""
+        hits = self._hits[row] = [*self._hits.get(row, [])[-REPEATED:], (t, speed)]
+        times, speeds = np.array(hits).T
         falling = len(speeds) > REPEATED and bool((np.diff(speeds) < 0.0).all() and (np.diff(times, 2) < 0.0).all())
         return falling and speed * (times[-1] - times[-2]) < EBBED
 
@@ -248,10 +261,8 @@ class Events:
         """The state after an event at which rows close or cease to act, both (rows,) of bool."""
         before = memory.acting > 0.0
         collision = self._impacts.at(memory)
-        speed = collision.speed(before, closes)
-        ebbed = speed > 0.0 and self._ebbs(memory.t, speed)
-        held, hit = (before | closes, closes & False) if ebbed else (before, closes)
-        velocity, impulses, touching, lost = collision.solved(held, hit)
+        ebbed = self._ebbing(memory.t, collision.speeds(before, closes))
+        velocity, impulses, touching, lost = collision.solved(before | ebbed, closes & ~ebbed)
         there = replace(memory, rates=_with_velocity(memory.rates, velocity), last=None, lost=memory.lost + lost)
         acting, lam = self._settled(there, touching & ~ceases, touching, h)
         there = replace(there, acting=acting.astype(float), lam=lam)
@@ -269,13 +280,16 @@ class Events:
         h = self._length(h)
         while h > SHORTEST:
             tried: set[bytes] = set()
-            now = acting
+            now, fewest, patience = acting, len(acting) + 1, PATIENCE
             while now.tobytes() not in tried:
                 tried.add(now.tobytes())
-                found, lam = self._tried(memory, now, touching, h)
+                wrong, lam = self._tried(memory, now, touching, h)
                 if lam is not None:
                     return now, lam
-                now = found
+                # All that is wrong is changed at once while less is wrong from time to time, then one row at a time.
+                count = int(wrong.sum())
+                fewest, patience = (count, PATIENCE) if count < fewest else (fewest, patience - 1)
+                now = now ^ (wrong if patience > 0 else np.arange(len(wrong)) == np.flatnonzero(wrong)[-1])
             # What goes from one choice to the next may go round: where there are few all are tried.
             for choice in _choices(touching):
                 if choice.tobytes() not in tried and (lam := self._tried(memory, choice, touching, h)[1]) is not None:
@@ -287,17 +301,14 @@ class Events:
         raise SolveError(Status.STOPPED, f"at {seconds:.9g} s no choice of what acts holds, of {names}", memory)
 
     def _tried(self, memory: Memory, acting: Array, touching: Array, h: float) -> tuple[Array, Array | None]:
-        """Multipliers where a choice of rows that act holds, else None, and the next choice that may."""
+        """Rows (rows,) that a choice of those that act has wrong, and all multipliers where there are none."""
         forces, opened, rounding = self._forces(replace(memory, acting=acting.astype(float)), h)
-        forces, opened = np.where(acting, forces, np.inf), np.where(touching & ~acting, opened, np.inf)
-        pulled, passed = int(np.argmin(forces)), int(np.argmin(opened))
-        if forces[pulled] < -rounding:
-            return acting & (np.arange(len(acting)) != pulled), None
-        if opened[passed] < -ROUNDING:
-            return acting | (np.arange(len(acting)) == passed), None
+        wrong = np.where(acting, forces < -rounding, touching & (opened < -ROUNDING))
+        if wrong.any():
+            return wrong, None
         lam = np.zeros(len(memory.lam))
         lam[self.rows] = self.signs * np.where(acting, forces, 0.0)
-        return acting, lam
+        return wrong, lam
 
     def _consistent(self, memory: Memory) -> Memory:
         """The state with the nearest velocities that all acting rows allow."""
@@ -351,6 +362,16 @@ def _with_velocity(rates: Array, velocity: Array) -> Array:
 
 MOST, BRIEF = 200, 1e-3
 """Events that are too many within this share of the motion."""
+
+PATIENCE = 3
+"""Choices without one that has fewer rows wrong, after which one row is changed at a time.
+
+Source: Judice and Pires, A block principal pivoting algorithm for large-scale strictly monotone linear complementarity
+problems, Computers & Operations Research 21 (1994); one at a time, always the last, as Murty does.
+"""
+
+ANY = -1
+"""In the place of a row: any of them."""
 
 FEW = 5
 """Rows that touch at one time of which all choices are tried."""

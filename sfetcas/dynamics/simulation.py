@@ -27,6 +27,7 @@ from ..mechanics.law_limits import first_beyond_laws
 from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
+from ..mechanics.spots import fine_enough, spots_of
 from ..mechanics.unilateral import all_stops, rows_of
 from ..stopping import arrived
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
@@ -130,7 +131,8 @@ class Simulation:
         meshing = Meshing(self.scene, settings)
         self.accuracy, self.asked, self.quantity = meshing.accuracy, meshing.asked, meshing.quantity
         self.prescribed = meshing.prescribed
-        self.mesh: Mesh = replace(meshing.target, places=True, stops=all_stops(scene))
+        mesh = replace(meshing.target, places=True, stops=all_stops(scene))
+        self.mesh: Mesh = fine_enough(self.scene, mesh, self.accuracy, meshing.fixed)
         self.seconds = {"model": 0.0, "build": 0.0, "solve": 0.0}
 
     # -- times ----------------------------------------------------------------------------------------
@@ -163,6 +165,7 @@ class Simulation:
     def run(self, mesh: Mesh, rounds: int, before: int | None = None) -> MeshRun:
         """The motion on a mesh, after so many coarser runs, the last of which took so many steps."""
         begin = time.perf_counter()
+        mesh = replace(mesh, spots=spots_of(self.scene, mesh)) if self.scene.contacts else mesh
         model = assemble(self.scene, mesh, assembly="nodal")
         equations = Equations(model, kernels=self.settings.kernels)
         masses = masses_of(model)
@@ -269,9 +272,14 @@ class Simulation:
         rows = system.unilateral
         if not len(rows):
             return np.zeros(0)
-        if self.scene.analysis.initial == "equilibrium":
-            return rows.acting(self.before.model.mesh.stops)
         opened = system.openings(state, 0.0)
+        of_obstacles = np.array([part.spot is not None for part in rows.parts])
+        near = tolerances.CLOSED * self.scene.size / system.model.scales.length
+        touching = of_obstacles & (opened <= near)
+        self._refuse_inside(system, np.where(of_obstacles, opened, np.inf))
+        if self.scene.analysis.initial == "equilibrium":
+            return np.where(of_obstacles, touching, rows.acting(self.before.model.mesh.stops)).astype(float)
+        opened = np.where(of_obstacles, np.inf, opened)
         worst = int(np.argmin(opened))
         if opened[worst] < -TOGETHER:
             table, name = rows.names[worst].split(".", 1)
@@ -280,7 +288,16 @@ class Simulation:
                 f"found {missing:.3g} m shorter than its way at t = 0, accepted: as long, or initial = 'equilibrium'"
             )
             raise SceneError(message, (table, name))
-        return (opened <= TOGETHER).astype(float)
+        return (touching | (opened <= TOGETHER)).astype(float)
+
+    def _refuse_inside(self, system: StageEquations, opened: Array) -> None:
+        """Refuse members that begin inside an obstacle, where they are said to be turned."""
+        size, worst = system.model.scales.length, int(np.argmin(opened))
+        deep = -float(opened[worst]) * size
+        if deep > max(tolerances.CLOSED, self.accuracy) * self.scene.size:
+            part = system.unilateral.parts[worst]
+            message = f"found {part.where} inside, by {deep:.3g} m at t = 0, accepted: members that begin outside"
+            raise SceneError(message, (part.table, part.name))
 
     @property
     def before(self) -> Equilibrium:

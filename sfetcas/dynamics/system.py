@@ -236,12 +236,13 @@ class System(Expressions):
     def floating(self) -> tuple[Array, Array] | None:
         """Changes of displacement unknowns (y, axes) and quantities (x, axes) in a unit translation along each axis.
 
-        None where the ground restrains anything, or where the position matters, as in rotating axes.
+        None where the ground restrains anything, or where the position matters, as in rotating axes and at obstacles.
         """
         positions, axes = self.model.positions, self.axes
         grounded = (
             any((group.places < 0).any() for group in self.model.connections) or self.model.rotating_frame is not None
         )
+        grounded = grounded or bool(self.model.mesh.spots)
         # Strains, angles of tubes and tensions are displacements by their numbers alone.
         moving = ~np.isin(positions.Y.row // axes, self.model.segments.without_position)
         free = self.places - len(self.model.segments.without_position)

@@ -19,7 +19,7 @@ from ..description.tubes import tube_breaks
 from ..mathematics.arrays import Array, first_of_largest
 from .carried import carried, magnetic, natural_turning
 
-__all__ = ["Cushion", "Mesh", "Remembered", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
+__all__ = ["Cushion", "Mesh", "Remembered", "Spot", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,31 @@ class Touch:
     def places(self) -> tuple[float, ...]:
         """The fractions of the length: one for a place, two for a stretch."""
         return (self.at,) if self.to is None else (self.at, self.to)
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A place that an obstacle stops in a motion: an end of a member, or of elements within one.
+
+    Attributes
+    ----------
+    contact, member : str
+        Names of the obstacle and the member; of several members that end there the first.
+    at : float
+        Fraction of the length of the member.
+    place : str
+        Name of the place among those of the model: of the node, or of the end of elements.
+    """
+
+    contact: str
+    member: str
+    at: float
+    place: str
+
+    @property
+    def name(self) -> str:
+        """Name of its constraint row."""
+        return f"contacts.{self.contact} at {self.place}"
 
 
 @dataclass(frozen=True)
@@ -131,6 +156,8 @@ class Mesh:
         Penalty contacts, in the order of their members and fractions.
     places : bool
         Whether every end of an element of a flexible member has displacement unknowns, as masses need.
+    spots : tuple of Spot, or None
+        Where obstacles stop members in a motion; None where it is no mesh of one with obstacles.
     memory : mapping of str to Remembered, or None
         What members remember whose laws have memory, nothing before the first step; None where no step is known to
         come after another.
@@ -144,6 +171,7 @@ class Mesh:
     stops: tuple[tuple[str, str], ...] = ()
     cushions: tuple[Cushion, ...] = ()
     places: bool = False
+    spots: tuple[Spot, ...] | None = None
     memory: Mapping[str, Remembered] | None = field(default=None, compare=False, repr=False)
 
     def __repr__(self) -> str:
