@@ -15,6 +15,10 @@ decide they are those of a short step from there, from velocities that the rows 
 Where impacts come ever closer, as between two rows at an acute angle, the rows stay closed once the way between two of
 them is next to nothing.
 
+Places of a flexible member that an obstacle stops hit it and leave it again and again as waves run to and fro.  There
+what happens soon after another event is found at the end of a short step, all of it at once, if nothing is then further
+inside an obstacle than is accepted: a row that acts stays at the value that it has.
+
 Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts (1996).
 """
 
@@ -70,17 +74,21 @@ class Events:
         Of a system with unilateral constraints.
     span : float
         Dimensionless time of the whole motion.
+    late : float
+        How far members may be inside obstacles where events follow each other quickly, unit of length.
 
     Attributes
     ----------
     found : list of Event
     """
 
-    def __init__(self, stepper: Stepper, span: float) -> None:
-        self.stepper, self.system, self._span = stepper, stepper.system, span
+    def __init__(self, stepper: Stepper, span: float, late: float = 0.0) -> None:
+        self.stepper, self.system, self._span, self._late = stepper, stepper.system, span, late
+        self._of_obstacles = np.array([part.spot is not None for part in stepper.system.unilateral.parts])
         self.rows, self.signs = self.system.unilateral.rows, self.system.unilateral.signs
         self._impacts, self.found = Impacts(self.system), list[Event]()
-        self._offset = np.zeros(len(self.rows))
+        # When it happened last, and how often at the same time before.
+        self._offset, self._last, self._again = np.zeros(len(self.rows)), -np.inf, 0
         # Times of events; times and speeds of the last impacts, of all rows and of each.
         self._times: list[float] = []
         self._hits: dict[int, list[tuple[float, float]]] = {}
@@ -105,8 +113,10 @@ class Events:
         closing, released = self._closing(taken), self._released(taken)
         if closing is None and released is None:
             return None
-        self._refuse_endless(taken.begin)
         share = min(one for one in (closing, released) if one is not None)
+        if (together := self._together(taken, share)) is not None:
+            return together
+        self._refuse_endless(taken.begin)
         steps = self._advanced(taken, share) if share * taken.h > SHORTEST else []
         memory = steps[-1].after if steps else taken.begin
         acting = memory.acting > 0.0
@@ -118,6 +128,33 @@ class Events:
         forces = np.where(acting, self._forces(self._consistent(memory), self._length(taken.h))[0], np.inf)
         ceases = np.arange(len(acting)) == np.argmin(forces)
         return Passed(steps, self._after(memory, np.zeros(len(acting), bool), ceases, taken.h))
+
+    def _together(self, taken: Taken, share: float) -> Passed | None:
+        """All that happens shortly after another event, at the end of a short step; None where that would be too late.
+
+        ``share`` of the step that was taken is that after which the first of it happens.
+        """
+        if not self._of_obstacles.any():
+            return None
+        begin, first = taken.begin, taken.begin.t + share * taken.h - self._last
+        allowed = np.where(self._of_obstacles, self._late, TOGETHER)
+        for soon in SOON * self._span:
+            if soon < max(first, self._last + SHORTEST - begin.t):
+                return None
+            steps = self._advanced(taken, min((self._last + soon - begin.t) / taken.h, 1.0))
+            memory = steps[-1].after
+            opened = self._opened(memory.q, memory.y, memory.t, memory)
+            if (opened >= -allowed).all():
+                break
+        else:
+            return None
+        acting = memory.acting > 0.0
+        closes = ~acting & (opened + self._offset < TOGETHER)
+        ceases = np.zeros(len(acting), bool)
+        if acting.any():
+            forces, _, rounding = self._forces(self._consistent(memory), self._length(taken.h))
+            ceases = acting & (forces < -rounding)
+        return Passed(steps, self._after(memory, closes, ceases, taken.h))
 
     def _at(self, taken: Taken, share: float) -> Memory:
         """The state after a share of a step that was taken."""
@@ -263,10 +300,14 @@ class Events:
         collision = self._impacts.at(memory)
         ebbed = self._ebbing(memory.t, collision.speeds(before, closes))
         velocity, impulses, touching, lost = collision.solved(before | ebbed, closes & ~ebbed)
+        opened = self._opened(memory.q, memory.y, memory.t, memory)
+        self._again = self._again + 1 if memory.t == self._last else 0
+        self._offset, self._last = np.maximum(-opened, 0.0), memory.t
         there = replace(memory, rates=_with_velocity(memory.rates, velocity), last=None, lost=memory.lost + lost)
+        there = replace(there, held=-self.signs * opened)
         acting, lam = self._settled(there, touching & ~ceases, touching, h)
         there = replace(there, acting=acting.astype(float), lam=lam)
-        self._offset = np.where(acting, 0.0, np.maximum(-self._opened(there.q, there.y, there.t, there), 0.0))
+        self._offset[acting] = 0.0
         hardest = int(np.argmax(impulses))
         for i in np.flatnonzero((acting != before) | (impulses > 0.0)).tolist():
             own = lost if i == hardest else 0.0
@@ -277,7 +318,8 @@ class Events:
         """Which of the rows that touch act from now on, (rows,) of bool, and all multipliers."""
         if not touching.any():
             return acting, np.zeros(len(memory.lam))
-        h = self._length(h)
+        # Where it did not hold at this time in a longer step, a shorter one is asked.
+        h = max(self._length(h) * SHORTER**self._again, SHORTEST / SHORTER)
         while h > SHORTEST:
             tried: set[bytes] = set()
             now, fewest, patience = acting, len(acting) + 1, PATIENCE
@@ -359,6 +401,9 @@ def _choices(touching: Array) -> Iterator[Array]:
 def _with_velocity(rates: Array, velocity: Array) -> Array:
     return np.vstack([velocity[None, :], rates[1:]])
 
+
+SOON = 1e-3 * 0.25 ** np.arange(4)
+"""Shares of the motion, the longest first, at whose end all is found together that follows an event."""
 
 MOST, BRIEF = 200, 1e-3
 """Events that are too many within this share of the motion."""

@@ -55,6 +55,8 @@ class Memory:
         What members remember, see :class:`~sfetcas.mechanics.memory.Remembering`.
     acting : ndarray
         For each unilateral constraint of the system whether it acts, 1 or 0.
+    held : ndarray
+        The values of their rows at which those hold that act: next to zero, unless they began to act late.
     lost : float
         Energy lost in impacts so far.
     """
@@ -70,6 +72,7 @@ class Memory:
     last: Taken | None = None
     remembered: Array = field(default_factory=lambda: np.zeros(0))
     acting: Array = field(default_factory=lambda: np.zeros(0))
+    held: Array = field(default_factory=lambda: np.zeros(0))
     lost: float = 0.0
 
     @property
@@ -178,7 +181,7 @@ class Stepper:
         turns = np.zeros((stages, n.rotations, system.turns)) if last is None else last.turns
         shifts = np.zeros((stages, n.y)) if last is None else last.shifts
         ratio = np.array([0.0 if last is None else h / last.h])
-        counted = np.concatenate([memory.unwrapped, memory.remembered[: system.memory.size], memory.acting])
+        counted = np.concatenate([memory.unwrapped, memory.remembered[: system.memory.size], memory.acting, memory.held])
         given = (memory.q, memory.y, memory.lam, turns, shifts, memory.x, memory.rates)
         for i, values in enumerate((*given, ratio, np.array([h]), factors, counted)):
             if values.size:
