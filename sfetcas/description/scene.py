@@ -28,9 +28,9 @@ from .loads import History, Load, Motion
 from .matrices import check_inertia, check_rigid_motion
 from .moving import (
     check_beginning,
+    check_contact,
     check_driving,
     check_masses,
-    check_contact,
     check_no_contact,
     check_unilateral,
     check_velocities,

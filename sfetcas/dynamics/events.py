@@ -89,6 +89,8 @@ class Events:
         self._impacts, self.found = Impacts(self.system), list[Event]()
         # When it happened last, and how often at the same time before.
         self._offset, self._last, self._again = np.zeros(len(self.rows)), -np.inf, 0
+        # How far inside rows were then.
+        self._depth = self._offset
         # Times of events; times and speeds of the last impacts, of all rows and of each.
         self._times: list[float] = []
         self._hits: dict[int, list[tuple[float, float]]] = {}
@@ -137,7 +139,9 @@ class Events:
         if not self._of_obstacles.any():
             return None
         begin, first = taken.begin, taken.begin.t + share * taken.h - self._last
-        allowed = np.where(self._of_obstacles, self._late, TOGETHER)
+        # What is as deep as it may be goes no further, but creeps.
+        deepest = np.maximum(self._late, self._depth + CREEPING * self._late)
+        allowed = np.where(self._of_obstacles, deepest, TOGETHER)
         for soon in SOON * self._span:
             if soon < max(first, self._last + SHORTEST - begin.t):
                 return None
@@ -298,11 +302,13 @@ class Events:
         """The state after an event at which rows close or cease to act, both (rows,) of bool."""
         before = memory.acting > 0.0
         collision = self._impacts.at(memory)
-        ebbed = self._ebbing(memory.t, collision.speeds(before, closes))
+        self._again = self._again + 1 if memory.t == self._last else 0
+        # What closes again and again at one time hops for less than the shortest step.
+        ebbed = closes.copy() if self._again > HOPS else self._ebbing(memory.t, collision.speeds(before, closes))
         velocity, impulses, touching, lost = collision.solved(before | ebbed, closes & ~ebbed)
         opened = self._opened(memory.q, memory.y, memory.t, memory)
-        self._again = self._again + 1 if memory.t == self._last else 0
-        self._offset, self._last = np.maximum(-opened, 0.0), memory.t
+        self._depth = np.maximum(-opened, 0.0)
+        self._offset, self._last = self._depth.copy(), memory.t
         there = replace(memory, rates=_with_velocity(memory.rates, velocity), last=None, lost=memory.lost + lost)
         there = replace(there, held=-self.signs * opened)
         acting, lam = self._settled(there, touching & ~ceases, touching, h)
@@ -404,6 +410,12 @@ def _with_velocity(rates: Array, velocity: Array) -> Array:
 
 SOON = 1e-3 * 0.25 ** np.arange(4)
 """Shares of the motion, the longest first, at whose end all is found together that follows an event."""
+
+HOPS = 2
+"""Events one after the other at the same time, after which rows that close stay closed."""
+
+CREEPING = 1e-3
+"""Share of what is accepted by which a member may go further inside an obstacle from one event to the next."""
 
 MOST, BRIEF = 200, 1e-3
 """Events that are too many within this share of the motion."""

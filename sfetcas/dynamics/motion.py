@@ -60,8 +60,8 @@ class Mover:
         side = "taut" if part.table == "tendons" else part.side
         impulse = event.impulse * (scales.moment if turns else scales.force) * self.time
         where = self.unilateral.names[event.row]
-        lost = event.lost * scales.moment
-        return StopEvent(event.t * self.time, where, side, event.acts, impulse, lost, turns, part.where)
+        lost, spot = event.lost * scales.moment, part.spot
+        return StopEvent(event.t * self.time, where, side, event.acts, impulse, lost, turns, spot.where if spot else "")
 
     def instant(self, sample: Sample) -> MotionState:
         """The state by name of a dimensionless sample; multipliers balance all forces in least squares."""
@@ -202,21 +202,24 @@ class MotionState(Configuration):
     def contacts(self) -> dict[str, dict[str, Any]]:
         """For each obstacle of the scene: ``force`` (3,) N on all members, ``gap`` m, and what is ``touching``.
 
-        The gap is the smallest distance of a member, below zero where one dips in between ends of elements; ``touching``
-        lists nodes, and members with fractions of their length: ``nodes.tip``, ``members.rod at 0.25``.
+        The gap is the smallest distance of a member, below zero where one dips in between ends of elements.  Nodes are
+        told as ``nodes.tip``, members with the fraction of their length: ``members.rod at 0.25``.
         """
         model, scene = self.model, self.model.scene
         if not scene.contacts:
             return {}
-        touched, parts = Touched.of(self.fields), self.mover.unilateral.parts
-        acting = [part for part, now in zip(parts, self.sample.acting, strict=True) if now and part.spot is not None]
-        found: dict[str, dict[str, Any]] = {}
+        touched, found = Touched.of(self.fields), dict[str, dict[str, Any]]()
         for name in scene.contacts:
-            own = [part for part in acting if part.name == name]
-            force = sum((touched.push_at(part.spot) for part in own if part.spot is not None), np.zeros(3))
-            gap = touched.smallest_gap(name, {})
-            found[name] = {"force": force, "gap": gap, "touching": [part.where for part in own]}
+            force = sum((force for _, _, force in self.pushes(name)), np.zeros(3))
+            touching = [spot.where for spot in model.mesh.spots or () if spot.contact == name]
+            found[name] = {"force": force, "gap": touched.smallest_gap(name, {}), "touching": touching}
         return found
+
+    def pushes(self, contact: str) -> list[tuple[str, float, Array]]:
+        """As of :meth:`.Configuration.pushes`, at each place where the obstacle stops a member."""
+        spots = [spot for spot in self.model.mesh.spots or () if spot.contact == contact]
+        touched = Touched.of(self.fields)
+        return [(spot.member, spot.at, touched.push_at(spot)) for spot in spots]
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
         """As :meth:`.Configuration.table`; also for the kinds ``energy`` and ``momentum``."""
@@ -313,7 +316,7 @@ class Trajectory:
     record : StepRecord or None
         The time steps of the integrator, which :meth:`between` and :meth:`resampled` interpolate; None of ``idas``.
     events : tuple of StopEvent
-        When tendons became taut or slack, and stops of springs and obstacles were reached or left, in the order of time.
+        When tendons became taut or slack, and stops of springs and obstacles were reached or left, as time goes on.
     """
 
     scene: Any = field(repr=False)

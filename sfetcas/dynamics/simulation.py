@@ -276,7 +276,8 @@ class Simulation:
         of_obstacles = np.array([part.spot is not None for part in rows.parts])
         near = tolerances.CLOSED * self.scene.size / system.model.scales.length
         touching = of_obstacles & (opened <= near)
-        self._refuse_inside(system, np.where(of_obstacles, opened, np.inf))
+        if of_obstacles.any():
+            self._refuse_inside(system, np.where(of_obstacles, opened, np.inf))
         if self.scene.analysis.initial == "equilibrium":
             return np.where(of_obstacles, touching, rows.acting(self.before.model.mesh.stops)).astype(float)
         opened = np.where(of_obstacles, np.inf, opened)
@@ -295,9 +296,10 @@ class Simulation:
         size, worst = system.model.scales.length, int(np.argmin(opened))
         deep = -float(opened[worst]) * size
         if deep > max(tolerances.CLOSED, self.accuracy) * self.scene.size:
-            part = system.unilateral.parts[worst]
-            message = f"found {part.where} inside, by {deep:.3g} m at t = 0, accepted: members that begin outside"
-            raise SceneError(message, (part.table, part.name))
+            spot = system.unilateral.parts[worst].spot
+            assert spot is not None
+            message = f"found {spot.where} inside, by {deep:.3g} m at t = 0, accepted: members that begin outside"
+            raise SceneError(message, ("contacts", spot.contact))
 
     @property
     def before(self) -> Equilibrium:

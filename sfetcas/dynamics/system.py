@@ -140,7 +140,7 @@ class System(Expressions):
         sizes = [group.kind.sizes[2] * len(group.data) for group in masses.observables]
         bounds = np.cumsum([self.linear, *sizes]).tolist()
         self.ranges = list(zip(bounds, bounds[1:], strict=False))
-        # What members remember, which unilateral constraints act and where they hold is given with the angles that count
+        # What members remember, and which unilateral constraints act and where, is given with the angles that count
         # turns, and changes as seldom.
         given = self.layout.unwrapped + self.memory.size + 2 * len(self.unilateral)
         self.layout = Layout(**{**vars(self.layout), "unwrapped": given}, x=bounds[-1])

@@ -87,6 +87,11 @@ class Spot:
         """Name of its constraint row."""
         return f"contacts.{self.contact} at {self.place}"
 
+    @property
+    def where(self) -> str:
+        """Where it is in the scene: ``nodes.tip``, or ``members.rod at 0.25`` of its length."""
+        return f"members.{self.member} at {self.at:.6g}" if 0.0 < self.at < 1.0 else f"nodes.{self.place}"
+
 
 @dataclass(frozen=True)
 class Cushion:

@@ -95,8 +95,7 @@ def _shortened(cuts: Array, longest: float) -> Array:
 
 
 COARSER = 16.0
-"""How much deeper flexible members may dip on the first mesh: halved twice, they dip by the accuracy into what is round.
-"""
+"""How much deeper flexible members may dip on the first mesh; halved twice, at what is round by no more than others."""
 
 MOST = 64
 """Elements of a member at most that this asks for: of more, motions take too long."""

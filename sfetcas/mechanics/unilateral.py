@@ -65,14 +65,6 @@ class Unilateral:
         return f"{self.table}.{self.name} {'at' if self.active(stops) else 'off'} its {self.side} stop"
 
     @property
-    def where(self) -> str:
-        """Where an obstacle stops a member: ``nodes.tip``, or ``members.rod at 0.25``; of others empty."""
-        if self.spot is None:
-            return ""
-        within = 0.0 < self.spot.at < 1.0
-        return f"members.{self.spot.member} at {self.spot.at:.6g}" if within else f"nodes.{self.spot.place}"
-
-    @property
     def undecided(self) -> str:
         """What it is in a sentence where its margin is zero: ``tendons.cable is neither taut nor slack``."""
         if self.side == "slack":
