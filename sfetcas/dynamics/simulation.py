@@ -27,7 +27,7 @@ from ..mechanics.law_limits import first_beyond_laws
 from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
-from ..mechanics.spots import fine_enough, spots_of
+from ..mechanics.spots import ending_at, fine_enough, spots_of
 from ..mechanics.unilateral import all_stops, rows_of
 from ..stopping import arrived
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
@@ -274,11 +274,12 @@ class Simulation:
             return np.zeros(0)
         opened = system.openings(state, 0.0)
         of_obstacles = np.array([part.spot is not None for part in rows.parts])
-        near = tolerances.CLOSED * self.scene.size / system.model.scales.length
+        begins = self.scene.analysis.initial == "equilibrium"
+        near = (RESTING * self.accuracy if begins else tolerances.CLOSED) * self.scene.size / system.model.scales.length
         touching = of_obstacles & (opened <= near)
         if of_obstacles.any():
             self._refuse_inside(system, np.where(of_obstacles, opened, np.inf))
-        if self.scene.analysis.initial == "equilibrium":
+        if begins:
             return np.where(of_obstacles, touching, rows.acting(self.before.model.mesh.stops)).astype(float)
         opened = np.where(of_obstacles, np.inf, opened)
         worst = int(np.argmin(opened))
@@ -318,6 +319,8 @@ class Simulation:
         """The answer: runs on finer and finer discretisations until two agree to the accuracy."""
         analysis = self.scene.analysis
         mesh, error = self.mesh, None
+        if self.scene.contacts and analysis.initial == "equilibrium":
+            mesh = ending_at(self.scene, mesh, self.before.model.mesh.touches)
         apart: float | None = None
         run = self.run(mesh, 0)
         for rounds in range(1, 1 + ROUNDS if analysis.step is None else 1):
@@ -480,6 +483,9 @@ def left(apart: float, before: float | None, accuracy: float) -> float:
     ratio = min(apart / before, UNSUPPORTED / (1.0 + UNSUPPORTED)) if before > 0.0 else 0.0
     return apart * max(ratio / (1.0 - ratio), 1.0 / GAINED)
 
+
+RESTING = 0.01
+"""Share of the accuracy within which places are on an obstacle in equilibrium, whose positions have a tenth of it."""
 
 LOST_RUNS = 0.1
 """Difference of runs, relative, beyond which they do not follow the same motion to its end."""

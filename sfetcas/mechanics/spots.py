@@ -8,21 +8,22 @@ neither is more than what is accepted.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from .. import tolerances
 from ..description.obstacles import Obstacle, members_of, obstacle, takes_part
 from ..description.scene import Scene
 from ..description.structure import SLIDING
 from ..mathematics.arrays import Array
 from .carried import carried
-from .mesh import Mesh, Spot
+from .mesh import Mesh, Spot, Touch, breaks_of
 from .rotations import end_joints
 from .segments import place_within
 
-__all__ = ["fine_enough", "spots_of"]
+__all__ = ["ending_at", "fine_enough", "spots_of"]
 
 
 def spots_of(scene: Scene, mesh: Mesh) -> tuple[Spot, ...]:
@@ -87,12 +88,33 @@ def fine_enough(scene: Scene, mesh: Mesh, accuracy: float, fixed: Collection[str
     return replace(mesh, cuts=cuts)
 
 
+def ending_at(scene: Scene, mesh: Mesh, touches: Sequence[Touch]) -> Mesh:
+    """The mesh with ends of elements where members touch obstacles in the equilibrium that a motion begins with."""
+    cuts = dict(mesh.cuts)
+    for touch in touches:
+        breaks = breaks_of(scene, touch.member)
+        for at in touch.places:
+            own = cuts[touch.member]
+            near = int(np.argmin(np.abs(own - at)))
+            if abs(own[near] - at) <= tolerances.DECIMAL:
+                continue
+            movable = 0 < near < len(own) - 1 and np.abs(breaks - own[near]).min() > tolerances.DECIMAL
+            # An end that is near is moved there: slivers gain nothing.
+            if movable and abs(own[near] - at) < WITHIN * np.diff(own)[near - 1 : near + 1].min():
+                own = np.delete(own, near)
+            cuts[touch.member] = np.sort(np.append(own, at))
+    return replace(mesh, cuts=cuts)
+
+
 def _shortened(cuts: Array, longest: float) -> Array:
     """Cuts between which there are equal parts that are no longer than a fraction of the length."""
     parts = np.maximum(1, np.ceil(np.diff(cuts) / longest * (1.0 - 1e-9))).astype(int)
     inner = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(cuts, cuts[1:], parts.tolist(), strict=False)]
     return np.concatenate([*inner, cuts[-1:]])
 
+
+WITHIN = 0.4
+"""Share of the shorter element beside an end of elements, within which it is moved to where a member touches."""
 
 COARSER = 16.0
 """How much deeper flexible members may dip on the first mesh; halved twice, at what is round by no more than others."""
