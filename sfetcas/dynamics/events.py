@@ -326,16 +326,18 @@ class Events:
             return acting, np.zeros(len(memory.lam))
         # Where it did not hold at this time in a longer step, a shorter one is asked.
         h = max(self._length(h) * SHORTER**self._again, SHORTEST / SHORTER)
+        best, least = acting, len(acting) + 1
         while h > SHORTEST:
             tried: set[bytes] = set()
             now, fewest, patience = acting, len(acting) + 1, PATIENCE
-            while now.tobytes() not in tried:
+            while now.tobytes() not in tried and len(tried) < TRIED * int(touching.sum()) + TRIED:
                 tried.add(now.tobytes())
                 wrong, lam = self._tried(memory, now, touching, h)
                 if lam is not None:
                     return now, lam
                 # All that is wrong is changed at once while less is wrong from time to time, then one row at a time.
                 count = int(wrong.sum())
+                best, least = (now, count) if count < least else (best, least)
                 fewest, patience = (count, PATIENCE) if count < fewest else (fewest, patience - 1)
                 now = now ^ (wrong if patience > 0 else np.arange(len(wrong)) == np.flatnonzero(wrong)[-1])
             # What goes from one choice to the next may go round: where there are few all are tried.
@@ -344,6 +346,9 @@ class Events:
                     return choice, lam
             # Waves that are shorter than the step make what is true at once untrue a little later.
             h *= SHORTER
+        if self._of_obstacles[touching].any():
+            # Waves through places side by side: what is wrong is an event at once.
+            return best, np.zeros(len(memory.lam))
         seconds = memory.t * self.stepper.time
         names = ", ".join(np.array(self.system.unilateral.names)[touching].tolist())
         raise SolveError(Status.STOPPED, f"at {seconds:.9g} s no choice of what acts holds, of {names}", memory)
@@ -426,6 +431,9 @@ PATIENCE = 3
 Source: Judice and Pires, A block principal pivoting algorithm for large-scale strictly monotone linear complementarity
 problems, Computers & Operations Research 21 (1994); one at a time, always the last, as Murty does.
 """
+
+TRIED = 3
+"""Choices that are tried at most for each row that touches."""
 
 ANY = -1
 """In the place of a row: any of them."""
