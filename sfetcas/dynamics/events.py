@@ -89,7 +89,8 @@ class Events:
         self._impacts, self.found = Impacts(self.system), list[Event]()
         # When it happened last, and how often at the same time before.
         self._offset, self._last, self._again = np.zeros(len(self.rows)), -np.inf, 0
-        # How far inside rows were then.
+        # When each row was hit last, and how far inside it was when it happened last.
+        self._hit = np.full(len(self.rows), -1e300)
         self._depth = self._offset
         # Times of events; times and speeds of the last impacts, of all rows and of each.
         self._times: list[float] = []
@@ -304,8 +305,12 @@ class Events:
         collision = self._impacts.at(memory)
         self._again = self._again + 1 if memory.t == self._last else 0
         # What closes again and again at one time hops for less than the shortest step.
-        ebbed = closes.copy() if self._again > HOPS else self._ebbing(memory.t, collision.speeds(before, closes))
-        velocity, impulses, touching, lost = collision.solved(before | ebbed, closes & ~ebbed)
+        speeds = collision.speeds(before, closes)
+        ebbed = closes.copy() if self._again > HOPS else self._ebbing(memory.t, speeds)
+        # What has hopped no further than is accepted does not rebound once more.
+        quiet = self._of_obstacles & (speeds > 0.0) & (speeds * (memory.t - self._hit) < self._late)
+        self._hit = np.where(speeds > 0.0, memory.t, self._hit)
+        velocity, impulses, touching, lost = collision.solved(before | ebbed, closes & ~ebbed, quiet)
         opened = self._opened(memory.q, memory.y, memory.t, memory)
         self._depth = np.maximum(-opened, 0.0)
         self._offset, self._last = self._depth.copy(), memory.t

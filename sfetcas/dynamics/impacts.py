@@ -100,13 +100,15 @@ class Collision:
             found[closes] = self._signs[closes] * moved
         return found
 
-    def solved(self, before: Array, closes: Array) -> tuple[Array, Array, Array, float]:
+    def solved(self, before: Array, closes: Array, quiet: Array | None = None) -> tuple[Array, Array, Array, float]:
         """Velocities (quantities,) after the event, impulses, which rows touch then, and the energy that is lost.
 
-        ``before`` and ``closes`` are the rows that act and those that close, (rows,) of bool.
+        ``before`` and ``closes`` are the rows that act and those that close, (rows,) of bool; ``quiet`` those of them
+        that do not rebound, whatever their restitution.
         """
         always = self._always
         w = self._allowed(before)
+        silent = np.zeros(len(before), bool) if quiet is None else quiet
         impulses, taking, lost = np.zeros(len(before)), np.flatnonzero(before | closes), 0.0
         touching = before.copy()
         if closes.any():
@@ -115,7 +117,9 @@ class Collision:
             # Rows that act do not move, and what moves so slowly is rounding.
             speed[before[taking] | (np.abs(speed) < SLOW)] = 0.0
             back = self._onto(always, chosen.T, np.zeros(len(always)))
-            found, left, lost, rebound = self._hit(chosen @ back, speed, self._restitution[taking])
+            found, left, lost, rebound = self._hit(
+                chosen @ back, speed, np.where(silent, 0.0, self._restitution)[taking]
+            )
             w = w - back @ found
             impulses[taking] = found
             slow = SLOW * max(1.0, float(np.abs(speed).max()))
