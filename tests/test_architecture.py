@@ -118,6 +118,7 @@ ORDER = [
     "mechanics.mass_centers",
     "mechanics.masses",
     "mechanics.rotating_frame",
+    "mechanics.spots",
     "mechanics.model",
     "mechanics.unilateral",
     "mechanics.tables",
