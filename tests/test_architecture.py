@@ -119,6 +119,7 @@ ORDER = [
     "mechanics.mass_centers",
     "mechanics.masses",
     "mechanics.rotating_frame",
+    "mechanics.spots",
     "mechanics.model",
     "mechanics.unilateral",
     "mechanics.tables",

@@ -288,15 +288,15 @@ FLOOR = {"contacts/floor": {"type": "plane", "point": [0, -1], "normal": [0, 1],
 STOPPED = {"springs/k": {"node": "A", "stiffness": 1.0, "stop": [-1, 1]}}
 
 
-@pytest.mark.parametrize("kind", ["modes", "dynamic"])
-def test_obstacles_are_refused(kind):
+def test_obstacles_are_refused():
     refused(
-        {**of_type(kind), **FLOOR},
-        f"contacts.floor: found an obstacle with analysis.type = {kind!r}, accepted: with 'static', "
+        {**of_type("modes"), **FLOOR},
+        "contacts.floor: found an obstacle with analysis.type = 'modes', accepted: with 'static', 'dynamic', "
         "or 'path' without modes",
     )
     assert made({**of_type("static"), **FLOOR, **STOPPED})
-    assert made({**of_type(kind), "springs/k": {"node": "A", "stiffness": 1.0}})
+    assert made({**of_type("dynamic"), **FLOOR, **STOPPED})
+    assert made({**of_type("modes"), "springs/k": {"node": "A", "stiffness": 1.0}})
 
 
 @pytest.mark.parametrize("kind", ["modes", "dynamic"])

@@ -98,6 +98,7 @@ class AnswerKind:
             "certificate.stable",
             "contacts.NAME.member",
             "contacts.NAME.other",
+            "contacts.NAME.touching",
             "tendons.NAME.slack",
             "tendons.NAME.tensions",
             "tendons.NAME.released",
@@ -175,12 +176,13 @@ motions.NAME.force | N | x y z | statics, motion, parameters | what makes a disp
 magnets.NAME.energy | J | | statics, motion, parameters | minus the moment times the field, summed along members
 magnets.NAME.torque | N m | x y z | statics, motion, parameters | of the fields, about the places of the magnet
 magnets.NAME.force | N | x y z | statics, motion, parameters | of fields that are not uniform
-contacts.NAME.force | N | x y z | statics | on the member; of a stretch its resultant
+contacts.NAME.force | N | x y z | statics, motion | on the member; of a stretch, and in motions, the resultant
 contacts.NAME.at | | | statics | fraction of the length, or [from, to]; null where nothing touches
-contacts.NAME.gap | m | | statics | smallest distance
+contacts.NAME.gap | m | | statics, motion | smallest distance
 contacts.NAME.member | | | statics | which it touches; all are lists where it touches more than once
 contacts.NAME.other | | | statics | between members: the second one; the force is that on the first
 contacts.NAME.other_at | | | statics | fraction of the length of the second one
+contacts.NAME.touching | | | motion | what touches: `nodes.tip`, `members.rod at 0.25`; a list
 energy.elastic | J | | all | of members, springs, tendons and tubes
 energy.dissipated | J | | statics, motion | by laws with memory, since undeformed; in motion also by impacts
 energy.loads | J | | statics, motion, parameters | from the undeformed scene

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from ..errors import SceneError
-from .records import Direction, Positive, Record, Vector, listed, say
+from .records import Direction, Positive, Record, Vector, listed, number, say
 from .sections import CrossSection
 from .structure import Member
 
@@ -38,6 +38,12 @@ def _side(value: Any) -> Any:
         if value not in ("inside", "outside"):
             raise ValueError(f"found {say(value)}, accepted: inside, outside, or a direction [x, y] or [x, y, z]")
         return value
+    return value
+
+
+def _share(value: float) -> float:
+    if not 0.0 <= value <= 1.0:
+        raise ValueError(f"found {value:g}, accepted: a share of the speed before, from 0 to 1")
     return value
 
 
@@ -70,6 +76,8 @@ class Contact(Record):
     side : (3,), or text
         Where members are allowed: a direction that points there; of what is round ``"inside"`` or
         ``"outside"``.  Default: of what is round the outside.
+    restitution : 1
+        Speed across the obstacle after an impact over that before, from 0 to 1; of motions alone.
     """
 
     type: Literal["point", "line", "plane", "circle", "cylinder", "sphere", "members"]
@@ -83,6 +91,7 @@ class Contact(Record):
     member: str | None = None
     members: Annotated[tuple[str, ...] | Literal["all"], BeforeValidator(_members)] | None = None
     side: Annotated[Direction | Literal["inside", "outside"], BeforeValidator(_side)] | None = None
+    restitution: Annotated[float, BeforeValidator(number), AfterValidator(_share)] = 0.0
 
     @model_validator(mode="after")
     def _check(self) -> Contact:
@@ -90,7 +99,7 @@ class Contact(Record):
         given = {key for key in self.model_fields_set if getattr(self, key) is not None}
         for key in sorted(needed - given):
             raise SceneError(f"the key {key!r} is missing: a {self.type} needs {' and '.join(sorted(needed))}")
-        for key in sorted(given - needed - possible - {"type", "member", "members"}):
+        for key in sorted(given - needed - possible - {"type", "member", "members", "restitution"}):
             what = "members touch each other" if self.between_members else f"the obstacle is a {self.type}"
             raise SceneError(f"not accepted: {what}", (key,))
         if (self.member is None) == (self.members is None):

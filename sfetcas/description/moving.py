@@ -8,8 +8,9 @@ from ..errors import SceneError
 from .contacts import Contact
 from .formulas import Formula
 from .loads import History, Load, Motion
+from .obstacles import members_of, obstacle
 from .records import say, unknown
-from .sections import CrossSection, Polynomial, Table
+from .sections import HEAVY, CrossSection, Polynomial, Table
 from .springs import Spring
 from .structure import Member, Node
 from .task import Analysis
@@ -17,6 +18,7 @@ from .tendons import Tendon
 
 __all__ = [
     "check_beginning",
+    "check_contact",
     "check_driving",
     "check_masses",
     "check_no_contact",
@@ -43,7 +45,7 @@ def check_masses(
 
 
 def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], springs: Mapping[str, Spring]) -> None:
-    """Refuse contacts, which vibrations and motions cannot treat, and stops, which vibrations along paths cannot.
+    """Refuse contacts, which vibrations cannot treat, and stops, which vibrations along paths cannot.
 
     Raises
     ------
@@ -51,13 +53,42 @@ def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], spring
         Names the first contact or stop.
     """
     given = "analysis.modes on a path" if analysis.type == "path" else f"analysis.type = {analysis.type!r}"
-    for name in contacts:
-        message = f"found an obstacle with {given}, accepted: with 'static', or 'path' without modes"
+    for name in contacts if analysis.type != "dynamic" else ():
+        message = f"found an obstacle with {given}, accepted: with 'static', 'dynamic', or 'path' without modes"
         raise SceneError(message, ("contacts", name))
     for name, spring in springs.items():
         if spring.stop is not None and analysis.type == "path":
             message = f"found a stop with {given}, accepted: with 'static', 'modes', 'dynamic', or 'path' without modes"
             raise SceneError(message, ("springs", name, "stop"))
+
+
+def check_contact(
+    analysis: Analysis,
+    contacts: Mapping[str, Contact],
+    members: Mapping[str, Member],
+    sections: Mapping[str, CrossSection],
+    space: bool,
+) -> None:
+    """Refuse obstacles that motions do not know, and what cannot hit one.
+
+    Raises
+    ------
+    SceneError
+        Names the obstacle.
+    """
+    for name, contact in contacts.items():
+        where = "contacts", name
+        if obstacle(contact, space).kind == "sharp":
+            message = f"found a {contact.type} that members slide over, accepted in a motion: a plane, circle, cylinder"
+            raise SceneError(f"{message} or sphere", (*where, "type"))
+        if analysis.integrator in ("idas", "conserving"):
+            found = f"found with the integrator {analysis.integrator!r}, which does not find when it is touched"
+            raise SceneError(f"{found}, accepted: radau-3, radau-2, generalised-alpha", where)
+        for member in members_of(contact, members):
+            section = sections.get(str(members[member].section))
+            if members[member].type == "flexible" and section is not None and not section.mass(HEAVY).all():
+                message = f"found the member {member!r}, whose section is without mass, so that it would have to jump"
+                raise SceneError(f"{message}, accepted: a small rhoA", where)
 
 
 def check_unilateral(analysis: Analysis, springs: Mapping[str, Spring], tendons: Mapping[str, Tendon]) -> None:

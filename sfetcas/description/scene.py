@@ -28,6 +28,7 @@ from .loads import History, Load, Motion
 from .matrices import check_inertia, check_rigid_motion
 from .moving import (
     check_beginning,
+    check_contact,
     check_driving,
     check_masses,
     check_no_contact,
@@ -296,6 +297,11 @@ class Scene(Record):
         """Whether springs have stops or tendons may be slack, so that it has to be found which of them act."""
         springs = any(spring.stop is not None for spring in self.springs.values())
         return springs or any(tendon.may_be_slack for tendon in self.tendons.values())
+
+    @property
+    def hits(self) -> bool:
+        """Whether there may be impacts in a motion: on obstacles, at stops, of strings."""
+        return self.stopped or bool(self.contacts)
 
     @property
     def limited(self) -> bool:
@@ -926,6 +932,7 @@ def _check_moving(scene: Scene) -> None:
     if analysis.moves:
         check_no_contact(analysis, scene.contacts, scene.springs)
     if analysis.type == "dynamic":
+        check_contact(analysis, scene.contacts, scene.members, scene.sections, scene.resolved_dimension == "space")
         check_unilateral(analysis, scene.springs, scene.tendons)
         check_driving(analysis, scene.nodes, scene.members, scene.motions, scene.histories, scene.tendons)
 

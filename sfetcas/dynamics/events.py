@@ -15,6 +15,10 @@ decide they are those of a short step from there, from velocities that the rows 
 Where impacts come ever closer, as between two rows at an acute angle, the rows stay closed once the way between two of
 them is next to nothing.
 
+Places of a flexible member that an obstacle stops hit it and leave it again and again as waves run to and fro.  There
+what happens soon after another event is found at the end of a short step, all of it at once, if nothing is then further
+inside an obstacle than is accepted: a row that acts stays at the value that it has.
+
 Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts (1996).
 """
 
@@ -70,20 +74,27 @@ class Events:
         Of a system with unilateral constraints.
     span : float
         Dimensionless time of the whole motion.
+    late : float
+        How far members may be inside obstacles where events follow each other quickly, unit of length.
 
     Attributes
     ----------
     found : list of Event
     """
 
-    def __init__(self, stepper: Stepper, span: float) -> None:
-        self.stepper, self.system, self._span = stepper, stepper.system, span
+    def __init__(self, stepper: Stepper, span: float, late: float = 0.0) -> None:
+        self.stepper, self.system, self._span, self._late = stepper, stepper.system, span, late
+        self._of_obstacles = np.array([part.spot is not None for part in stepper.system.unilateral.parts])
         self.rows, self.signs = self.system.unilateral.rows, self.system.unilateral.signs
         self._impacts, self.found = Impacts(self.system), list[Event]()
-        self._offset = np.zeros(len(self.rows))
-        # Times of events, and the times and speeds of impacts.
+        # When it happened last, and how often at the same time before.
+        self._offset, self._last, self._again = np.zeros(len(self.rows)), -np.inf, 0
+        # When each row was hit last, and how far inside it was when it happened last.
+        self._hit = np.full(len(self.rows), -1e300)
+        self._depth = self._offset
+        # Times of events; times and speeds of the last impacts, of all rows and of each.
         self._times: list[float] = []
-        self._hits: list[tuple[float, float]] = []
+        self._hits: dict[int, list[tuple[float, float]]] = {}
 
     # -- begin ----------------------------------------------------------------------------------------
 
@@ -105,8 +116,10 @@ class Events:
         closing, released = self._closing(taken), self._released(taken)
         if closing is None and released is None:
             return None
-        self._refuse_endless(taken.begin)
         share = min(one for one in (closing, released) if one is not None)
+        if (together := self._together(taken, share)) is not None:
+            return together
+        self._refuse_endless(taken.begin)
         steps = self._advanced(taken, share) if share * taken.h > SHORTEST else []
         memory = steps[-1].after if steps else taken.begin
         acting = memory.acting > 0.0
@@ -118,6 +131,35 @@ class Events:
         forces = np.where(acting, self._forces(self._consistent(memory), self._length(taken.h))[0], np.inf)
         ceases = np.arange(len(acting)) == np.argmin(forces)
         return Passed(steps, self._after(memory, np.zeros(len(acting), bool), ceases, taken.h))
+
+    def _together(self, taken: Taken, share: float) -> Passed | None:
+        """All that happens shortly after another event, at the end of a short step; None where that would be too late.
+
+        ``share`` of the step that was taken is that after which the first of it happens.
+        """
+        if not self._of_obstacles.any():
+            return None
+        begin, first = taken.begin, taken.begin.t + share * taken.h - self._last
+        # What is as deep as it may be goes no further, but creeps.
+        deepest = np.maximum(self._late, self._depth + CREEPING * self._late)
+        allowed = np.where(self._of_obstacles, deepest, TOGETHER)
+        for soon in SOON * self._span:
+            if soon < max(first, self._last + SHORTEST - begin.t):
+                return None
+            steps = self._advanced(taken, min((self._last + soon - begin.t) / taken.h, 1.0))
+            memory = steps[-1].after
+            opened = self._opened(memory.q, memory.y, memory.t, memory)
+            if (opened >= -allowed).all():
+                break
+        else:
+            return None
+        acting = memory.acting > 0.0
+        closes = ~acting & (opened + self._offset < TOGETHER)
+        ceases = np.zeros(len(acting), bool)
+        if acting.any():
+            forces, _, rounding = self._forces(self._consistent(memory), self._length(taken.h))
+            ceases = acting & (forces < -rounding)
+        return Passed(steps, self._after(memory, closes, ceases, taken.h))
 
     def _at(self, taken: Taken, share: float) -> Memory:
         """The state after a share of a step that was taken."""
@@ -134,10 +176,23 @@ class Events:
             detail = f"at {seconds:.9g} s one impact or release follows another, {MOST} of them, of {names}"
             raise SolveError(Status.STOPPED, detail, memory)
 
-    def _ebbs(self, t: float, speed: float) -> bool:
-        """Whether an impact is one of infinitely many that come ever closer: rows that it goes between stay closed."""
-        self._hits = [*self._hits[-REPEATED:], (t, speed)]
-        times, speeds = np.array(self._hits).T
+    def _ebbing(self, t: float, speeds: Array) -> Array:
+        """Rows (rows,) whose impacts are some of infinitely many that come ever closer: these stay closed.
+
+        Those are impacts of one row, or of several between which something goes to and fro.
+        """
+        hit = speeds > 0.0
+        if not hit.any():
+            return hit
+        if self._ebbs(ANY, t, float(speeds.max())):
+            return hit
+        own = [bool(hit[i]) and self._ebbs(i, t, float(speeds[i])) for i in range(len(hit))]
+        return np.array(own)
+
+    def _ebbs(self, row: int, t: float, speed: float) -> bool:
+        """Whether an impact of a row, or of any, is the last of a series that counts."""
+        hits = self._hits[row] = [*self._hits.get(row, [])[-REPEATED:], (t, speed)]
+        times, speeds = np.array(hits).T
         falling = len(speeds) > REPEATED and bool((np.diff(speeds) < 0.0).all() and (np.diff(times, 2) < 0.0).all())
         return falling and speed * (times[-1] - times[-2]) < EBBED
 
@@ -248,14 +303,22 @@ class Events:
         """The state after an event at which rows close or cease to act, both (rows,) of bool."""
         before = memory.acting > 0.0
         collision = self._impacts.at(memory)
-        speed = collision.speed(before, closes)
-        ebbed = speed > 0.0 and self._ebbs(memory.t, speed)
-        held, hit = (before | closes, closes & False) if ebbed else (before, closes)
-        velocity, impulses, touching, lost = collision.solved(held, hit)
+        self._again = self._again + 1 if memory.t == self._last else 0
+        # What closes again and again at one time hops for less than the shortest step.
+        speeds = collision.speeds(before, closes)
+        ebbed = closes.copy() if self._again > HOPS else self._ebbing(memory.t, speeds)
+        # What has hopped no further than is accepted does not rebound once more.
+        quiet = self._of_obstacles & (speeds > 0.0) & (speeds * (memory.t - self._hit) < self._late)
+        self._hit = np.where(speeds > 0.0, memory.t, self._hit)
+        velocity, impulses, touching, lost = collision.solved(before | ebbed, closes & ~ebbed, quiet)
+        opened = self._opened(memory.q, memory.y, memory.t, memory)
+        self._depth = np.maximum(-opened, 0.0)
+        self._offset, self._last = self._depth.copy(), memory.t
         there = replace(memory, rates=_with_velocity(memory.rates, velocity), last=None, lost=memory.lost + lost)
+        there = replace(there, held=-self.signs * opened)
         acting, lam = self._settled(there, touching & ~ceases, touching, h)
         there = replace(there, acting=acting.astype(float), lam=lam)
-        self._offset = np.where(acting, 0.0, np.maximum(-self._opened(there.q, there.y, there.t, there), 0.0))
+        self._offset[acting] = 0.0
         hardest = int(np.argmax(impulses))
         for i in np.flatnonzero((acting != before) | (impulses > 0.0)).tolist():
             own = lost if i == hardest else 0.0
@@ -266,38 +329,44 @@ class Events:
         """Which of the rows that touch act from now on, (rows,) of bool, and all multipliers."""
         if not touching.any():
             return acting, np.zeros(len(memory.lam))
-        h = self._length(h)
+        # Where it did not hold at this time in a longer step, a shorter one is asked.
+        h = max(self._length(h) * SHORTER**self._again, SHORTEST / SHORTER)
+        best, least = acting, len(acting) + 1
         while h > SHORTEST:
             tried: set[bytes] = set()
-            now = acting
-            while now.tobytes() not in tried:
+            now, fewest, patience = acting, len(acting) + 1, PATIENCE
+            while now.tobytes() not in tried and len(tried) < TRIED * int(touching.sum()) + TRIED:
                 tried.add(now.tobytes())
-                found, lam = self._tried(memory, now, touching, h)
+                wrong, lam = self._tried(memory, now, touching, h)
                 if lam is not None:
                     return now, lam
-                now = found
+                # All that is wrong is changed at once while less is wrong from time to time, then one row at a time.
+                count = int(wrong.sum())
+                best, least = (now, count) if count < least else (best, least)
+                fewest, patience = (count, PATIENCE) if count < fewest else (fewest, patience - 1)
+                now = now ^ (wrong if patience > 0 else np.arange(len(wrong)) == np.flatnonzero(wrong)[-1])
             # What goes from one choice to the next may go round: where there are few all are tried.
             for choice in _choices(touching):
                 if choice.tobytes() not in tried and (lam := self._tried(memory, choice, touching, h)[1]) is not None:
                     return choice, lam
             # Waves that are shorter than the step make what is true at once untrue a little later.
             h *= SHORTER
+        if self._of_obstacles[touching].any():
+            # Waves through places side by side: what is wrong is an event at once.
+            return best, np.zeros(len(memory.lam))
         seconds = memory.t * self.stepper.time
         names = ", ".join(np.array(self.system.unilateral.names)[touching].tolist())
         raise SolveError(Status.STOPPED, f"at {seconds:.9g} s no choice of what acts holds, of {names}", memory)
 
     def _tried(self, memory: Memory, acting: Array, touching: Array, h: float) -> tuple[Array, Array | None]:
-        """Multipliers where a choice of rows that act holds, else None, and the next choice that may."""
+        """Rows (rows,) that a choice of those that act has wrong, and all multipliers where there are none."""
         forces, opened, rounding = self._forces(replace(memory, acting=acting.astype(float)), h)
-        forces, opened = np.where(acting, forces, np.inf), np.where(touching & ~acting, opened, np.inf)
-        pulled, passed = int(np.argmin(forces)), int(np.argmin(opened))
-        if forces[pulled] < -rounding:
-            return acting & (np.arange(len(acting)) != pulled), None
-        if opened[passed] < -ROUNDING:
-            return acting | (np.arange(len(acting)) == passed), None
+        wrong = np.where(acting, forces < -rounding, touching & (opened < -ROUNDING))
+        if wrong.any():
+            return wrong, None
         lam = np.zeros(len(memory.lam))
         lam[self.rows] = self.signs * np.where(acting, forces, 0.0)
-        return acting, lam
+        return wrong, lam
 
     def _consistent(self, memory: Memory) -> Memory:
         """The state with the nearest velocities that all acting rows allow."""
@@ -349,8 +418,30 @@ def _with_velocity(rates: Array, velocity: Array) -> Array:
     return np.vstack([velocity[None, :], rates[1:]])
 
 
+SOON = 1e-3 * 0.25 ** np.arange(4)
+"""Shares of the motion, the longest first, at whose end all is found together that follows an event."""
+
+HOPS = 2
+"""Events one after the other at the same time, after which rows that close stay closed."""
+
+CREEPING = 1e-3
+"""Share of what is accepted by which a member may go further inside an obstacle from one event to the next."""
+
 MOST, BRIEF = 200, 1e-3
 """Events that are too many within this share of the motion."""
+
+PATIENCE = 3
+"""Choices without one that has fewer rows wrong, after which one row is changed at a time.
+
+Source: Judice and Pires, A block principal pivoting algorithm for large-scale strictly monotone linear complementarity
+problems, Computers & Operations Research 21 (1994); one at a time, always the last, as Murty does.
+"""
+
+TRIED = 3
+"""Choices that are tried at most for each row that touches."""
+
+ANY = -1
+"""In the place of a row: any of them."""
 
 FEW = 5
 """Rows that touch at one time of which all choices are tried."""

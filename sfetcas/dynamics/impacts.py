@@ -3,12 +3,13 @@
 Velocities ``w`` of the unknowns change by impulses ``p`` along the rows ``H`` that act or close, so that none closes
 further,
 
-    M (w+ - w) = H^T p,      p >= 0,      H w+ >= 0,      p . H w+ = 0,
+    M (w+ - w) = H^T p,      p >= 0,      H w+ >= -e H w,      p . (H w+ + e H w) = 0,
 
-without rebound; rows ``G`` of all other constraints hold before and after, with impulses of either sign.  It is the
-velocity nearest to ``w`` in the metric of the masses ``M`` that all rows allow (Gauss's principle of least constraint),
-and what is lost is ``1/2 (w - w+).M (w - w+)``, never below zero.  Where several rows act the impulses are those of a
-least-squares problem with bounds.
+where ``e`` is the restitution of each row, and zero of one that opens.  Rows ``G`` of all other constraints hold before
+and after, with impulses of either sign.  Without restitution it is the velocity nearest to ``w`` in the metric of the
+masses ``M`` that all rows allow (Gauss's principle of least constraint).  What is lost, ``1/2 w.M w - 1/2 w+.M w+`` as
+seen from the rows, is not below zero where all ``e`` are alike; where they differ and it would be, the least of them
+counts for all.  Where several rows act the impulses are those of a least-squares problem with bounds.
 
 Source: Moreau, Unilateral contact and dry friction in finite freedom dynamics, in: Nonsmooth Mechanics and
 Applications, CISM 302 (1988); Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23.
@@ -63,7 +64,9 @@ class Collision:
 
     def __init__(self, impacts: Impacts, memory: Memory) -> None:
         system, unit = impacts.system, impacts.system.masses.time
-        self._system, self._rows, self._signs = system, system.unilateral.rows, system.unilateral.signs
+        unilateral = system.unilateral
+        self._system, self._rows, self._signs = system, unilateral.rows, unilateral.signs
+        self._restitution = unilateral.restitution
         self._state = State(memory.q, memory.y, memory.lam, memory.unwrapped)
         self._factors = system.factors(memory.t)
         rates = [0.0 if history is None else history.rate(memory.t * unit) for history in system.histories]
@@ -88,20 +91,24 @@ class Collision:
         held = np.concatenate([self._always, self._rows[before]])
         return self._onto(held, self._momentum[:, None], -self._opening[held])[:, 0]
 
-    def speed(self, before: Array, closes: Array) -> float:
-        """The largest speed with which a row closes; arguments as of :meth:`solved`."""
-        if not closes.any():
-            return 0.0
-        rows = self._rows[closes]
-        return float((self._signs[closes] * (self._jacobian[rows] @ self._allowed(before) + self._opening[rows])).max())
+    def speeds(self, before: Array, closes: Array) -> Array:
+        """The speeds (rows,) with which rows close, zero of others; arguments as of :meth:`solved`."""
+        found = np.zeros(len(closes))
+        if closes.any():
+            rows = self._rows[closes]
+            moved = self._jacobian[rows] @ self._allowed(before) + self._opening[rows]
+            found[closes] = self._signs[closes] * moved
+        return found
 
-    def solved(self, before: Array, closes: Array) -> tuple[Array, Array, Array, float]:
+    def solved(self, before: Array, closes: Array, quiet: Array | None = None) -> tuple[Array, Array, Array, float]:
         """Velocities (quantities,) after the event, impulses, which rows touch then, and the energy that is lost.
 
-        ``before`` and ``closes`` are the rows that act and those that close, (rows,) of bool.
+        ``before`` and ``closes`` are the rows that act and those that close, (rows,) of bool; ``quiet`` those of them
+        that do not rebound, whatever their restitution.
         """
         always = self._always
         w = self._allowed(before)
+        silent = np.zeros(len(before), bool) if quiet is None else quiet
         impulses, taking, lost = np.zeros(len(before)), np.flatnonzero(before | closes), 0.0
         touching = before.copy()
         if closes.any():
@@ -110,14 +117,30 @@ class Collision:
             # Rows that act do not move, and what moves so slowly is rounding.
             speed[before[taking] | (np.abs(speed) < SLOW)] = 0.0
             back = self._onto(always, chosen.T, np.zeros(len(always)))
-            found = _complementary(chosen @ back, speed)
+            found, left, lost, rebound = self._hit(
+                chosen @ back, speed, np.where(silent, 0.0, self._restitution)[taking]
+            )
             w = w - back @ found
-            left = speed - chosen @ back @ found
             impulses[taking] = found
-            touching[taking] = (found > 0.0) | (left > -SLOW * max(1.0, float(np.abs(speed).max())))
-            lost = 0.5 * float(found @ chosen @ back @ found)
+            slow = SLOW * max(1.0, float(np.abs(speed).max()))
+            touching[taking] = ((found > 0.0) & (rebound <= slow)) | (left > -slow)
         _, velocity, _, _ = self._system.rates_in_time(self._state, self._factors, w * self._unit, self._faster)
         return velocity, impulses, touching, lost
+
+    @staticmethod
+    def _hit(yielding: Array, speed: Array, restitution: Array) -> tuple[Array, Array, float, Array]:
+        """Impulses, speeds of closing after them, the energy that is lost, and the speeds of rebound, (n,) each."""
+        closing = np.maximum(speed, 0.0)
+        rebound = restitution * closing
+        found = _complementary(yielding, speed + rebound)
+        left = speed - yielding @ found
+        lost = 0.5 * float(found @ (speed + left))
+        if lost < 0.0 and rebound.any():
+            rebound = restitution[speed > 0.0].min() * closing
+            found = _complementary(yielding, speed + rebound)
+            left = speed - yielding @ found
+            lost = 0.5 * float(found @ (speed + left))
+        return found, left, max(lost, 0.0), rebound
 
     def _onto(self, rows: Index, momenta: Array, opening: Array) -> Array:
         """Velocities (unknowns, n) for momenta (unknowns, n) under which rows open at given rates (rows,)."""
@@ -146,7 +169,14 @@ def _complementary(yielding: Array, speed: Array) -> Array:
 
     values, vectors = np.linalg.eigh(0.5 * (yielding + yielding.T))
     root = np.sqrt(np.maximum(values, MASSLESS * values.max(initial=TINY)))
-    return np.asarray(nnls(root[:, None] * vectors.T, (vectors.T @ speed) / root)[0])
+    found = np.asarray(nnls(root[:, None] * vectors.T, (vectors.T @ speed) / root)[0])
+    # It errs by the square root of what counts as no mass: those that push are found once more by themselves.
+    push = np.flatnonzero(found > 0.0)
+    own = yielding[np.ix_(push, push)]
+    better = found[push] + np.linalg.lstsq(own, speed[push] - own @ found[push], rcond=MASSLESS)[0]
+    if len(push) and (better > 0.0).all():
+        found[push] = better
+    return found
 
 
 SLOW = 1e-9

@@ -55,6 +55,8 @@ class Memory:
         What members remember, see :class:`~sfetcas.mechanics.memory.Remembering`.
     acting : ndarray
         For each unilateral constraint of the system whether it acts, 1 or 0.
+    held : ndarray
+        The values of their rows at which those hold that act: next to zero, unless they began to act late.
     lost : float
         Energy lost in impacts so far.
     """
@@ -70,6 +72,7 @@ class Memory:
     last: Taken | None = None
     remembered: Array = field(default_factory=lambda: np.zeros(0))
     acting: Array = field(default_factory=lambda: np.zeros(0))
+    held: Array = field(default_factory=lambda: np.zeros(0))
     lost: float = 0.0
 
     @property
@@ -178,7 +181,9 @@ class Stepper:
         turns = np.zeros((stages, n.rotations, system.turns)) if last is None else last.turns
         shifts = np.zeros((stages, n.y)) if last is None else last.shifts
         ratio = np.array([0.0 if last is None else h / last.h])
-        counted = np.concatenate([memory.unwrapped, memory.remembered[: system.memory.size], memory.acting])
+        counted = np.concatenate(
+            [memory.unwrapped, memory.remembered[: system.memory.size], memory.acting, memory.held]
+        )
         given = (memory.q, memory.y, memory.lam, turns, shifts, memory.x, memory.rates)
         for i, values in enumerate((*given, ratio, np.array([h]), factors, counted)):
             if values.size:
@@ -332,7 +337,8 @@ def integrate(
                 memory = taken.after if passed is None else passed.after
                 if passed is not None:
                     break
-            first = going.h
+            # Of two first steps each is half as long as what is tried: event by event they would become ever shorter.
+            first = going.h if passed is None or going.h is None else max(LONGER * going.h, LONGER * SHORTEST)
             if passed is None or end - memory.t <= tolerances.DECIMAL * end:
                 break
     for _ in range(BEYOND):
@@ -353,6 +359,9 @@ def _happens(events: Watching, taken: Taken) -> bool:
     except SolveError:
         return True
 
+
+LONGER = 4.0
+"""Length of the first step that is tried after an event, over the last step before, or over the shortest one."""
 
 BEYOND = 3
 """Steps beyond the end at most."""

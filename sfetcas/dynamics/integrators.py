@@ -146,10 +146,11 @@ class Stages(Integrator):
         rates[0] = begun.v
         begin = self.system.memory.begun
         given = state.q, state.y, state.lam, begun.x, rates, state.unwrapped
-        memory = Memory(0.0, *given, remembered=begin, acting=begun.touching)
+        memory = Memory(0.0, *given, remembered=begin, acting=begun.touching, held=0.0 * begun.touching)
         self._sampler, self.record = Sampler(course.times, method.stages), StepRecord(method.stages)
         first = None if course.step is not None else max(FIRST * course.end, min(course.end, SHORTEST))
-        events = Events(stepper, course.end) if len(self.system.unilateral) else None
+        late = LATE * course.accuracy * course.size * 0.5**course.rounds
+        events = Events(stepper, course.end, late) if len(self.system.unilateral) else None
         if events is not None:
             self.events = events.found
             memory = events.begun(memory, course.step or first or course.end)
@@ -191,6 +192,9 @@ class Stages(Integrator):
         first = (self._stepper.method.gain * course.accuracy) ** (of_step / order)
         return float(course.size * first * 2.0 ** (-of_step * course.rounds))
 
+
+LATE = 0.1
+"""Share of the accuracy by which members may be inside obstacles where events follow each other quickly."""
 
 FIRST = 1e-3
 """First step that is tried, over the span."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..contact.touches import Touched
 from ..description.answers import MOTION
 from ..description.records import counted, plain, say
 from ..description.showing import error_in_words, notes_in_words, number_in_words, shown
@@ -59,7 +60,8 @@ class Mover:
         side = "taut" if part.table == "tendons" else part.side
         impulse = event.impulse * (scales.moment if turns else scales.force) * self.time
         where = self.unilateral.names[event.row]
-        return StopEvent(event.t * self.time, where, side, event.acts, impulse, event.lost * scales.moment, turns)
+        lost, spot = event.lost * scales.moment, part.spot
+        return StopEvent(event.t * self.time, where, side, event.acts, impulse, lost, turns, spot.where if spot else "")
 
     def instant(self, sample: Sample) -> MotionState:
         """The state by name of a dimensionless sample; multipliers balance all forces in least squares."""
@@ -94,8 +96,8 @@ class Mover:
         """The equations of the model in which unilateral constraints act as told, (rows,), 1 or 0."""
         found = self._models.get(acting.tobytes())
         if found is None:
-            model, stops = self.model, self.unilateral.stops(acting)
-            mesh = replace(model.mesh, stops=stops)
+            model = self.model
+            mesh = self.unilateral.mesh(model.mesh, acting)
             alone = assemble(model.scene, mesh, assembly=model.assembly, scales=model.scales, like=model)  # type: ignore[arg-type]
             found = self._models[acting.tobytes()] = Equations(alone, kernels="interpreted")
         return found
@@ -185,7 +187,7 @@ class MotionState(Configuration):
         """
         kinetic, elastic, loads = (part * self.model.scales.moment for part in self.energies)
         lost, spent = dict[str, float](), self.fields.dissipated
-        if spent or self.model.scene.stopped:
+        if spent or self.model.scene.hits:
             lost["dissipated"] = sum(spent.values()) + self.sample.lost * self.model.scales.moment
         return {"kinetic": kinetic, "elastic": elastic, **lost, "loads": loads, "total": kinetic + elastic + loads}
 
@@ -195,6 +197,29 @@ class MotionState(Configuration):
         linear, angular = self.mover.inertia.momentum(self.sample.x, self.sample.v)
         time, scales = self.mover.time, self.model.scales
         return {"linear": linear * scales.force * time, "angular": angular * scales.moment * time}
+
+    @functools.cached_property
+    def contacts(self) -> dict[str, dict[str, Any]]:
+        """For each obstacle of the scene: ``force`` (3,) N on all members, ``gap`` m, and what is ``touching``.
+
+        The gap is the smallest distance of a member, below zero where one dips in between ends of elements.  Nodes are
+        told as ``nodes.tip``, members with the fraction of their length: ``members.rod at 0.25``.
+        """
+        model, scene = self.model, self.model.scene
+        if not scene.contacts:
+            return {}
+        touched, found = Touched.of(self.fields), dict[str, dict[str, Any]]()
+        for name in scene.contacts:
+            force = sum((force for _, _, force in self.pushes(name)), np.zeros(3))
+            touching = [spot.where for spot in model.mesh.spots or () if spot.contact == name]
+            found[name] = {"force": force, "gap": touched.smallest_gap(name, {}), "touching": touching}
+        return found
+
+    def pushes(self, contact: str) -> list[tuple[str, float, Array]]:
+        """As of :meth:`.Configuration.pushes`, at each place where the obstacle stops a member."""
+        spots = [spot for spot in self.model.mesh.spots or () if spot.contact == contact]
+        touched = Touched.of(self.fields)
+        return [(spot.member, spot.at, touched.push_at(spot)) for spot in spots]
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
         """As :meth:`.Configuration.table`; also for the kinds ``energy`` and ``momentum``."""
@@ -210,29 +235,33 @@ class MotionState(Configuration):
     def to_dict(self) -> dict[str, Any]:
         """The quantities of this time as nested dictionaries, of which :meth:`Trajectory.to_dict` makes lists."""
         tables = self.tables("nodes", "reactions", "springs", "tendons", "tubes", "rings", "motions")
+        tables |= {"contacts": dict(self.contacts)} if self.contacts else {}
         return {**tables, "energy": self.energy, "momentum": self.momentum}
 
 
 @dataclass(frozen=True)
 class StopEvent:
-    """When a tendon becomes taut or slack, or a stop of a spring is reached or left.
+    """When a tendon becomes taut or slack, or a stop of a spring or an obstacle is reached or left.
 
     Attributes
     ----------
     time : float
         s.
     name : str
-        ``tendons.NAME`` or ``springs.NAME``.
+        ``tendons.NAME``, ``springs.NAME`` or ``contacts.NAME``.
     side : str
-        ``taut`` of a tendon; ``low`` or ``high`` of a stop.
+        ``taut`` of a tendon; ``low`` or ``high`` of a stop; ``touching`` of an obstacle.
     acts : bool
-        Whether the tendon is taut, or the spring at its stop, from then on.
+        Whether the tendon is taut, the spring at its stop, or the member at the obstacle, from then on.
     impulse : float
-        Of the tension or the stop, not below zero, N s; N m s of a stop of an angle; zero where nothing hits.
+        Of the tension, the stop or the obstacle, not below zero, N s; N m s of a stop of an angle; zero where nothing
+        hits.
     dissipated : float
         The energy that all impulses of that time dissipate, J, at the largest of them; else zero.
     turns : bool
         Whether it is a stop of an angle.
+    where : str
+        What touches the obstacle: ``nodes.tip``, or ``members.rod at 0.25``; else empty.
     """
 
     time: float
@@ -242,12 +271,16 @@ class StopEvent:
     impulse: float
     dissipated: float
     turns: bool = False
+    where: str = ""
 
     def __str__(self) -> str:
         when, unit = f"at {self.time:.9g} s {self.name}", "N m s" if self.turns else "N s"
         what = f"{'at' if self.acts else 'off'} its {self.side} stop"
         if self.side == "taut":
             what = "taut" if self.acts else "slack"
+        elif self.where:
+            left = "hits it and leaves" if self.impulse else "leaves it"
+            what = f"{self.where} {'touches it' if self.acts else left}"
         hit = f", after an impulse of {number_in_words(self.impulse, unit)}" if self.impulse else ""
         lost = f", {number_in_words(self.dissipated, 'N m')} dissipated" if self.dissipated else ""
         return f"{when}: {what}{hit}{lost}"
@@ -283,7 +316,7 @@ class Trajectory:
     record : StepRecord or None
         The time steps of the integrator, which :meth:`between` and :meth:`resampled` interpolate; None of ``idas``.
     events : tuple of StopEvent
-        When tendons became taut or slack, and stops of springs were reached or left, in the order of time.
+        When tendons became taut or slack, and stops of springs and obstacles were reached or left, as time goes on.
     """
 
     scene: Any = field(repr=False)
@@ -430,7 +463,7 @@ class Trajectory:
             **({"error_of": self.error_of} if self.error_of else {}),
             "violation": dict(self.violation),
             "notes": list(self.notes),
-            **({"events": [vars(event) for event in self.events]} if self.scene.stopped else {}),
+            **({"events": [vars(event) for event in self.events]} if self.scene.hits else {}),
             "times": self.times.tolist(),
             **_columns([step.to_dict() for step in self.steps]),
         }

@@ -24,6 +24,11 @@ __all__ = ["Sample", "Sampler", "StepRecord", "between", "turned_by"]
 DOUBTFUL = 10.0
 """How much more one node less may change the polynomial through ends: that of all stages does not show its error."""
 
+UNEVEN = 0.05
+"""Length of a step over that of another one below which no polynomial goes through both: steps change slowly, and end
+where something happens.
+"""
+
 NODES = 6
 """Intervals of the polynomials, where so many are smoothly connected."""
 
@@ -203,7 +208,13 @@ def _polynomials(
     for around, chosen in ((NODES, slice(-1, None)), (-(-NODES // stages), slice(0, None))):
         if chosen.start == 0 or len(ends) >= NODES:
             first = max(0, min(k - (around - 1) // 2, len(ends) - around))
-            found.append(_interpolated(steps[first : first + around], steps[k], t, chosen))
+            last = min(first + around, len(ends))
+            # Beside an event there may be steps so short that the polynomial through all is none of a longer one.
+            while first < k and steps[first].h < UNEVEN * steps[k].h:
+                first += 1
+            while last > k + 1 and steps[last - 1].h < UNEVEN * steps[k].h:
+                last -= 1
+            found.append(_interpolated(steps[first:last], steps[k], t, chosen if last - first > 1 else slice(0, None)))
     return found
 
 

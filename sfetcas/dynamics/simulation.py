@@ -27,6 +27,7 @@ from ..mechanics.law_limits import first_beyond_laws
 from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
+from ..mechanics.spots import ending_at, fine_enough, spots_of
 from ..mechanics.unilateral import all_stops, rows_of
 from ..stopping import arrived
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
@@ -130,7 +131,8 @@ class Simulation:
         meshing = Meshing(self.scene, settings)
         self.accuracy, self.asked, self.quantity = meshing.accuracy, meshing.asked, meshing.quantity
         self.prescribed = meshing.prescribed
-        self.mesh: Mesh = replace(meshing.target, places=True, stops=all_stops(scene))
+        mesh = replace(meshing.target, places=True, stops=all_stops(scene))
+        self.mesh: Mesh = fine_enough(self.scene, mesh, self.accuracy, meshing.fixed)
         self.seconds = {"model": 0.0, "build": 0.0, "solve": 0.0}
 
     # -- times ----------------------------------------------------------------------------------------
@@ -163,6 +165,7 @@ class Simulation:
     def run(self, mesh: Mesh, rounds: int, before: int | None = None) -> MeshRun:
         """The motion on a mesh, after so many coarser runs, the last of which took so many steps."""
         begin = time.perf_counter()
+        mesh = replace(mesh, spots=spots_of(self.scene, mesh)) if self.scene.contacts else mesh
         model = assemble(self.scene, mesh, assembly="nodal")
         equations = Equations(model, kernels=self.settings.kernels)
         masses = masses_of(model)
@@ -269,9 +272,16 @@ class Simulation:
         rows = system.unilateral
         if not len(rows):
             return np.zeros(0)
-        if self.scene.analysis.initial == "equilibrium":
-            return rows.acting(self.before.model.mesh.stops)
         opened = system.openings(state, 0.0)
+        of_obstacles = np.array([part.spot is not None for part in rows.parts])
+        begins = self.scene.analysis.initial == "equilibrium"
+        near = (RESTING * self.accuracy if begins else tolerances.CLOSED) * self.scene.size / system.model.scales.length
+        touching = of_obstacles & (opened <= near)
+        if of_obstacles.any():
+            self._refuse_inside(system, np.where(of_obstacles, opened, np.inf))
+        if begins:
+            return np.where(of_obstacles, touching, rows.acting(self.before.model.mesh.stops)).astype(float)
+        opened = np.where(of_obstacles, np.inf, opened)
         worst = int(np.argmin(opened))
         if opened[worst] < -TOGETHER:
             table, name = rows.names[worst].split(".", 1)
@@ -280,7 +290,17 @@ class Simulation:
                 f"found {missing:.3g} m shorter than its way at t = 0, accepted: as long, or initial = 'equilibrium'"
             )
             raise SceneError(message, (table, name))
-        return (opened <= TOGETHER).astype(float)
+        return (touching | (opened <= TOGETHER)).astype(float)
+
+    def _refuse_inside(self, system: StageEquations, opened: Array) -> None:
+        """Refuse members that begin inside an obstacle, where they are said to be turned."""
+        size, worst = system.model.scales.length, int(np.argmin(opened))
+        deep = -float(opened[worst]) * size
+        if deep > max(tolerances.CLOSED, self.accuracy) * self.scene.size:
+            spot = system.unilateral.parts[worst].spot
+            assert spot is not None
+            message = f"found {spot.where} inside, by {deep:.3g} m at t = 0, accepted: members that begin outside"
+            raise SceneError(message, ("contacts", spot.contact))
 
     @property
     def before(self) -> Equilibrium:
@@ -299,6 +319,8 @@ class Simulation:
         """The answer: runs on finer and finer discretisations until two agree to the accuracy."""
         analysis = self.scene.analysis
         mesh, error = self.mesh, None
+        if self.scene.contacts and analysis.initial == "equilibrium":
+            mesh = ending_at(self.scene, mesh, self.before.model.mesh.touches)
         apart: float | None = None
         run = self.run(mesh, 0)
         for rounds in range(1, 1 + ROUNDS if analysis.step is None else 1):
@@ -461,6 +483,9 @@ def left(apart: float, before: float | None, accuracy: float) -> float:
     ratio = min(apart / before, UNSUPPORTED / (1.0 + UNSUPPORTED)) if before > 0.0 else 0.0
     return apart * max(ratio / (1.0 - ratio), 1.0 / GAINED)
 
+
+RESTING = 0.01
+"""Share of the accuracy within which places are on an obstacle in equilibrium, whose positions have a tenth of it."""
 
 LOST_RUNS = 0.1
 """Difference of runs, relative, beyond which they do not follow the same motion to its end."""

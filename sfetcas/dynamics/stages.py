@@ -240,7 +240,7 @@ class _Stage:
         self.residual = static.gathered(shares)
         if len(system.unilateral):
             n = system.equations.unknowns
-            self.residual = ca.vertcat(self.residual[:n], system.switched(self.residual[n:], unwrapped))
+            self.residual = ca.vertcat(self.residual[:n], system.missed(self.residual[n:], unwrapped))
         self.entries = ca.vertcat(*entries, ca.MX(1))
 
     def coupled(self, other: _Stage, c: ca.MX, b: ca.MX) -> ca.MX:

@@ -63,7 +63,7 @@ def step_function(system: StageEquations, method: Method) -> ca.Function:
         method.after(h, rates, there - ca.repmat(x, 1, s)),
         size,
         count,
-        ca.norm_inf(ca.vertcat(0.0, system.switched(gaps, unwrapped))),
+        ca.norm_inf(ca.vertcat(0.0, system.missed(gaps, unwrapped))),
     ]
     names = ["q", "y", "lam", "turns", "shifts", "x", "rates", "ratio", "h", "factors", "unwrapped"]
     arguments = [q, y, lam, turns, shifts, x, rates, ratio, h, loads, unwrapped]

@@ -140,9 +140,9 @@ class System(Expressions):
         sizes = [group.kind.sizes[2] * len(group.data) for group in masses.observables]
         bounds = np.cumsum([self.linear, *sizes]).tolist()
         self.ranges = list(zip(bounds, bounds[1:], strict=False))
-        # What members remember, and which unilateral constraints act, is given with the angles that count turns, and
-        # changes as seldom.
-        given = self.layout.unwrapped + self.memory.size + len(self.unilateral)
+        # What members remember, and which unilateral constraints act and where, is given with the angles that count
+        # turns, and changes as seldom.
+        given = self.layout.unwrapped + self.memory.size + 2 * len(self.unilateral)
         self.layout = Layout(**{**vars(self.layout), "unwrapped": given}, x=bounds[-1])
 
     def data(self, number: int, given: Given, unwrapped: ca.MX) -> ca.MX:
@@ -159,13 +159,14 @@ class System(Expressions):
     def counted(self, state: State, acting: Array | None = None) -> Array:
         """The angles that count turns in a state, what members remember at the begin, which unilateral constraints act.
 
-        By default all do.
+        By default all do, and hold at zero.
         """
-        acting = np.ones(len(self.unilateral)) if acting is None else acting
-        return np.concatenate([state.unwrapped, self.memory.begun[: self.memory.size], acting])
+        count = len(self.unilateral)
+        acting = np.ones(count) if acting is None else acting
+        return np.concatenate([state.unwrapped, self.memory.begun[: self.memory.size], acting, np.zeros(count)])
 
     def switched(self, rows: ca.MX, unwrapped: ca.MX) -> ca.MX:
-        """Numbers of the rows (rows,), such as gaps or multipliers, zero where a unilateral constraint does not act."""
+        """Multipliers of the rows (rows,), zero where a unilateral constraint does not act."""
         count = len(self.unilateral)
         if not count:
             return rows
@@ -173,9 +174,21 @@ class System(Expressions):
         acting[self.unilateral.rows.tolist()] = self.acting(unwrapped)
         return rows * acting
 
+    def missed(self, rows: ca.MX, unwrapped: ca.MX) -> ca.MX:
+        """Values of the rows (rows,) over those that they are to have; zero where a unilateral constraint does not act.
+
+        One that acts holds at the value that it had when it began to.
+        """
+        if not len(self.unilateral):
+            return rows
+        held = ca.MX.zeros(self.layout.lam)
+        held[self.unilateral.rows.tolist()] = unwrapped[self.layout.unwrapped - len(self.unilateral) :]
+        return self.switched(rows - held, unwrapped)
+
     def acting(self, unwrapped: ca.MX) -> ca.MX:
         """For each unilateral constraint whether it acts, 1 or 0."""
-        return unwrapped[self.layout.unwrapped - len(self.unilateral) :]
+        end, count = self.layout.unwrapped, len(self.unilateral)
+        return unwrapped[end - 2 * count : end - count]
 
     def _along(self, *, timed: bool) -> ca.Function:
         """(q, y, factors, unwrapped, step, faster) -> quantities and their derivative along a step of the unknowns.
@@ -236,12 +249,13 @@ class System(Expressions):
     def floating(self) -> tuple[Array, Array] | None:
         """Changes of displacement unknowns (y, axes) and quantities (x, axes) in a unit translation along each axis.
 
-        None where the ground restrains anything, or where the position matters, as in rotating axes.
+        None where the ground restrains anything, or where the position matters, as in rotating axes and at obstacles.
         """
         positions, axes = self.model.positions, self.axes
         grounded = (
             any((group.places < 0).any() for group in self.model.connections) or self.model.rotating_frame is not None
         )
+        grounded = grounded or bool(self.model.mesh.spots)
         # Strains, angles of tubes and tensions are displacements by their numbers alone.
         moving = ~np.isin(positions.Y.row // axes, self.model.segments.without_position)
         free = self.places - len(self.model.segments.without_position)

@@ -318,6 +318,13 @@ class Configuration:
         found = closest.answers(self.fields) | touches.answers(self.fields)
         return {name: found[name] for name in scene.contacts}
 
+    def pushes(self, contact: str) -> list[tuple[str, float, Array]]:
+        """Where an obstacle pushes: member, fraction of its length, of a stretch its middle, and force (3,), N."""
+        entry = self.contacts[contact]
+        several = isinstance(entry["member"], list)
+        parts = (entry[key] if several else [entry[key]] for key in ("member", "at", "force"))
+        return [(member, float(np.mean(at)), force) for member, at, force in zip(*parts, strict=True) if at is not None]
+
     @functools.cached_property
     def energy(self) -> dict[str, float]:
         """``elastic`` energy, potential of the ``loads``, and their ``total``, N m; zero for the undeformed scene.

@@ -39,7 +39,7 @@ from .joints import (
     TurnStop,
     Universal,
 )
-from .mesh import Cushion, Mesh, Touch
+from .mesh import Cushion, Mesh, Spot, Touch
 from .parts import Parts
 from .rotations import Pin, RotationFreedom, Rotations, end_joints
 from .segments import Segments, cushioned
@@ -253,6 +253,8 @@ class _Toucher:
             covered |= set(ends)
         for cushion in self.mesh.cushions:
             yield self._cushioned(cushion)
+        for spot in self.mesh.spots or ():
+            yield self._stopped(spot)
 
     def place(self, touch: Touch, at: float) -> int:
         """Number of the place of a touch."""
@@ -275,6 +277,16 @@ class _Toucher:
         start = start + touch.offset * stop.side / np.linalg.norm(stop.side) if stop.side is not None else start
         data = np.concatenate([stop.normal, tangent, start[:axes] / unit, [touch.way]])
         return One(OnEdge(axes == 3), touch.name, "", data, (int(turns[0]),), places, touch.name)
+
+    def _stopped(self, spot: Spot) -> One:
+        """A place that an obstacle stops in a motion."""
+        space = self.element.space
+        stop = obstacle(self.scene.contacts[spot.contact], space)
+        start = self.scene.center_lines[spot.member].positions(np.array([spot.at]))[0] - stop.place
+        flat = stop.kind == "flat"
+        data = self._flat(stop, start, 0.0) if flat else self._round(stop, start, 0.0)
+        kind = OnPlane(space) if flat else OnRound(space)
+        return One(kind, spot.contact, "", data, (), (self.segments.place(spot.place),), spot.name)
 
     def _flat(self, stop: Obstacle, start: Array, offset: float) -> Array:
         """Data of a place on a plane; ``start`` is where it begins, from the obstacle's place, m."""

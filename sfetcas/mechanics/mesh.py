@@ -19,7 +19,18 @@ from ..description.tubes import tube_breaks
 from ..mathematics.arrays import Array, first_of_largest
 from .carried import carried, magnetic, natural_turning
 
-__all__ = ["ContactPoint", "Cushion", "Mesh", "Remembered", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
+__all__ = [
+    "ContactPoint",
+    "Cushion",
+    "Mesh",
+    "Remembered",
+    "Spot",
+    "Touch",
+    "breaks_of",
+    "cut",
+    "first_mesh",
+    "uniform_mesh",
+]
 
 
 @dataclass(frozen=True)
@@ -116,6 +127,36 @@ class ContactPoint:
 
 
 @dataclass(frozen=True)
+class Spot:
+    """A place that an obstacle stops in a motion: an end of a member, or of elements within one.
+
+    Attributes
+    ----------
+    contact, member : str
+        Names of the obstacle and the member; of several members that end there the first.
+    at : float
+        Fraction of the length of the member.
+    place : str
+        Name of the place among those of the model: of the node, or of the end of elements.
+    """
+
+    contact: str
+    member: str
+    at: float
+    place: str
+
+    @property
+    def name(self) -> str:
+        """Name of its constraint row."""
+        return f"contacts.{self.contact} at {self.place}"
+
+    @property
+    def where(self) -> str:
+        """Where it is in the scene: ``nodes.tip``, or ``members.rod at 0.25`` of its length."""
+        return f"members.{self.member} at {self.at:.6g}" if 0.0 < self.at < 1.0 else f"nodes.{self.place}"
+
+
+@dataclass(frozen=True)
 class Cushion:
     """A penalty contact at a place of a member, used on the way to a state in contact.
 
@@ -185,6 +226,8 @@ class Mesh:
         Where members touch each other.
     places : bool
         Whether every end of an element of a flexible member has displacement unknowns, as masses need.
+    spots : tuple of Spot, or None
+        Where obstacles stop members in a motion; None where it is no mesh of one with obstacles.
     memory : mapping of str to Remembered, or None
         What members remember whose laws have memory, nothing before the first step; None where no step is known to
         come after another.
@@ -199,6 +242,7 @@ class Mesh:
     cushions: tuple[Cushion, ...] = ()
     points: tuple[ContactPoint, ...] = ()
     places: bool = False
+    spots: tuple[Spot, ...] | None = None
     memory: Mapping[str, Remembered] | None = field(default=None, compare=False, repr=False)
 
     def __repr__(self) -> str:

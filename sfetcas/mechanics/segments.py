@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..description.obstacles import members_of
 from ..description.scene import Scene
 from ..description.structure import SLIDING
 from ..description.tendons import Hole, Piece
@@ -31,6 +32,7 @@ __all__ = [
     "cut_members",
     "elongation_of",
     "place_of_ring",
+    "place_within",
     "pulled_place",
     "spanned",
     "tensions_of",
@@ -140,6 +142,11 @@ def _touched(mesh: Mesh, member: str) -> dict[int, str]:
     """Cuts of a member where obstacles push it, with the names of these places; its ends among them."""
     soft = {mesh.cut_at(member, c.at): cushioned(member, c.at) for c in mesh.cushions if c.member == member}
     return soft | {mesh.cut_at(member, touch.at): touch.name for touch in mesh.touches if touch.member == member}
+
+
+def place_within(member: str, at: float) -> str:
+    """Name of the place at a fraction of the length of a member where elements end."""
+    return f"{member} at {at:.12g}"
 
 
 def cushioned(member: str, at: float) -> str:
@@ -276,6 +283,10 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     """The segments of a scene on a mesh."""
     places, ends = list(scene.nodes), {}
     retained: set[str] = set()
+    # Whatever of it acts, so that all choices have the same unknowns.
+    stopped = set[str]()
+    for contact in scene.contacts.values() if mesh.spots is not None else ():
+        stopped |= set(members_of(contact, scene.members))
     parts: list[Segment] = []
     begin = 0
     for name, member in scene.members.items():
@@ -290,11 +301,12 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
         cuts = mesh.cuts[name]
         touched, last = _touched(mesh, name), len(cuts) - 1
         retained |= {ends[name, i] for i, cut in enumerate((0, last)) if cut in touched}
-        inner = range(1, last) if mesh.places and member.type == "flexible" else _retained_cuts(scene, mesh, name)
+        every = name in stopped or (mesh.places and member.type == "flexible")
+        inner = range(1, last) if every else _retained_cuts(scene, mesh, name)
         stops = [0, *sorted({*inner, *touched} - {0, last}), last]
         here = ends[name, 0]
         for a, b in zip(stops, stops[1:], strict=False):
-            there = ends[name, 1] if b == len(cuts) - 1 else touched.get(b, f"{name} at {cuts[b]:.12g}")
+            there = ends[name, 1] if b == len(cuts) - 1 else touched.get(b, place_within(name, cuts[b]))
             if b < len(cuts) - 1:
                 places.append(there)
                 retained.add(there)

@@ -1,4 +1,4 @@
-"""Unilateral constraints: strings that pull but do not push, and stops that push but do not pull.
+"""Unilateral constraints: strings that pull but do not push, and stops and obstacles that push but do not pull.
 
 Each is an inequality.  While it is active, its multiplier - a tension, or the reaction of a stop - must not be below
 zero; while it is not, its gap must not be: by how much a string is shorter than its free length, or what is left to
@@ -9,12 +9,13 @@ where a margin changes its sign the choice is another one.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, Index
+from .mesh import Mesh, Spot
 from .model import Model
 
 __all__ = ["NONE", "Stops", "Unilateral", "UnilateralRows", "all_stops", "rows_of", "switched_over", "unilaterals"]
@@ -30,14 +31,17 @@ class Unilateral:
     Attributes
     ----------
     table, name : str
-        ``tendons`` or ``springs``, and the name of the record.
+        ``tendons``, ``springs`` or ``contacts``, and the name of the record.
     side : str
-        ``slack`` of a tendon; ``low`` or ``high`` of a stop.
+        ``slack`` of a tendon; ``low`` or ``high`` of a stop; ``touching`` of an obstacle.
+    spot : Spot or None
+        Where an obstacle stops a member in a motion.
     """
 
     table: str
     name: str
     side: str
+    spot: Spot | None = None
 
     @property
     def entry(self) -> tuple[str, str]:
@@ -69,7 +73,7 @@ class Unilateral:
 
 
 def unilaterals(scene: Scene) -> tuple[Unilateral, ...]:
-    """The unilateral constraints of a scene: tendons first, in its order."""
+    """The unilateral constraints of a scene but its obstacles: tendons first, in its order."""
     strings = [Unilateral("tendons", name, "slack") for name, tendon in scene.tendons.items() if tendon.may_be_slack]
     stopped = [name for name, spring in scene.springs.items() if spring.stop is not None]
     return (*strings, *(Unilateral("springs", name, side) for name in stopped for side in ("low", "high")))
@@ -97,11 +101,14 @@ class UnilateralRows:
         Their numbers among the rows.
     signs : ndarray (n,)
         1 where a row must not be above zero, and its multiplier not below; -1 where it is the other way round.
+    restitution : ndarray (n,)
+        Speed after an impact over that before.
     """
 
     parts: tuple[Unilateral, ...]
     rows: Index
     signs: Array
+    restitution: Array
 
     def __len__(self) -> int:
         return len(self.parts)
@@ -111,17 +118,19 @@ class UnilateralRows:
         """Where each stands in the scene."""
         return [f"{part.table}.{part.name}" for part in self.parts]
 
-    def stops(self, acting: Array) -> Stops:
-        """The choice in which those are active whose number in ``acting`` (n,) is not zero."""
-        pairs = zip(self.parts, acting, strict=True)
-        return tuple(part.entry for part, now in pairs if bool(now) != (part.side == "slack"))
+    def mesh(self, mesh: Mesh, acting: Array) -> Mesh:
+        """The mesh of the choice in which those are active whose number in ``acting`` (n,) is not zero."""
+        pairs = list(zip(self.parts, (acting != 0.0).tolist(), strict=True))
+        stops = tuple(part.entry for part, now in pairs if part.spot is None and now != (part.side == "slack"))
+        spots = tuple(part.spot for part, now in pairs if part.spot is not None and now)
+        return replace(mesh, stops=stops, spots=None if mesh.spots is None else spots)
 
     def acting(self, stops: Stops) -> Array:
-        """The numbers (n,), one of those that are active, of a choice."""
-        return np.array([part.active(stops) for part in self.parts], dtype=float)
+        """The numbers (n,), one of those that are active, of a choice; no obstacle is."""
+        return np.array([part.spot is None and part.active(stops) for part in self.parts], dtype=float)
 
 
-NONE = UnilateralRows((), np.zeros(0, np.intp), np.zeros(0))
+NONE = UnilateralRows((), np.zeros(0, np.intp), np.zeros(0), np.zeros(0))
 """No row."""
 
 
@@ -132,13 +141,19 @@ def all_stops(scene: Scene) -> Stops:
 
 def rows_of(model: Model) -> UnilateralRows:
     """The rows of a model in which all unilateral constraints of its scene are active; none where it has none."""
-    parts, names = unilaterals(model.scene), model.row_names
-    found = []
-    for part in parts:
-        if part.table == "tendons":
+    scene, names = model.scene, model.row_names
+    touching = [Unilateral("contacts", spot.contact, "touching", spot) for spot in model.mesh.spots or ()]
+    parts = (*unilaterals(scene), *touching)
+    number = {name: i for i, name in enumerate(names)} if touching else {}
+    found, restitution = [], np.zeros(len(parts))
+    for i, part in enumerate(parts):
+        if part.spot is not None:
+            found.append(number[part.spot.name])
+            restitution[i] = scene.contacts[part.name].restitution
+        elif part.table == "tendons":
             found.append(names.index(f"tendons.{part.name}"))
         else:
-            both = [i for i, row in enumerate(names) if row == f"springs.{part.name}.stop"]
+            both = [k for k, row in enumerate(names) if row == f"springs.{part.name}.stop"]
             found.append(both[part.side == "high"])
-    signs = [-1.0 if part.side == "low" else 1.0 for part in parts]
-    return UnilateralRows(parts, np.array(found, dtype=np.intp), np.array(signs))
+    signs = [-1.0 if part.side in ("low", "touching") else 1.0 for part in parts]
+    return UnilateralRows(parts, np.array(found, dtype=np.intp), np.array(signs), restitution)

@@ -417,13 +417,9 @@ def _sketch_reaction(sketch: Sketch, name: str, node: Node) -> None:
 
 def _sketch_pushes(sketch: Sketch, name: str, contact: Contact) -> None:
     """What an obstacle pushes with."""
-    entry = sketch.step.contacts[name]
-    several = isinstance(entry["member"], list)
-    for member, at, force in zip(
-        *([entry[k]] if not several else entry[k] for k in ("member", "at", "force")), strict=True
-    ):
-        if at is not None and norm(force) > tolerances.NEGLIGIBLE * sketch.largest_force:
-            point = sketch.along(member, np.array([np.mean(at)]))[0]
+    for member, at, force in sketch.step.pushes(name):
+        if norm(force) > tolerances.NEGLIGIBLE * sketch.largest_force:
+            point = sketch.along(member, np.array([at]))[0]
             _sketch_force(sketch, point, force, Ink(f"push-{name}", REACTION, 1.1), pushing=True)
 
 
