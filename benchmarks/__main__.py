@@ -1,8 +1,10 @@
 """Accuracy and speed measured: ``python -m benchmarks [NAME ...] [--save]``, from a clone of the repository.
 
 Names are order, loads, size, repeated, derivatives, net, path, motion, steps, code, accuracy, pieces, sweep, import,
-extremes and compared; left out, all are run.  ``--save`` writes what each prints into ``benchmarks/results`` too.  Five
-others, ``random``, ``jitter``, ``contact``, ``members`` and ``ways``, stand alone, take options (``--help``) and half an hour each.
+extremes and compared; left out, all are run.  ``--save`` writes what each prints into ``benchmarks/results`` too.
+
+Others, ``random``, ``jitter``, ``contact``, ``members`` and ``ways``, stand alone, take options (``--help``) and half
+an hour each.
 
 Not a test: times are those of the machine at hand, the least of several or medians as the tables say.
 """

@@ -119,14 +119,13 @@ def _parallel(draw: _Draw) -> Table:
 
 def _loop(draw: _Draw) -> Table:
     """A beam whose ends are brought together and past each other, or turned, so that it closes to a loop."""
-    members = {"a": {"nodes": ["a0", "a1"]}}
+    members = {"a": {"nodes": ["a0", "a1"], "shape": {"type": "arc", "angle": -draw.between(0.3, 1.0)}}}
     nodes = {"a0": _held(0.0, 0.0), "a1": _held(1.0, 0.0)}
-    move: Table = {"type": "displacement"}
     if draw.chance(0.5):
         move = {"displacement": [-draw.between(0.8, 1.3), 0.0], "rotation": 0.0}
     else:
         move = {"displacement": [-draw.between(0.6, 1.0), draw.between(0.0, 0.1)], "rotation": draw.between(3.5, 6.0)}
-    aside = {"type": "force", "member": "a", "at": 0.5, "value": [0.0, draw.between(0.5, 2.0)]}
+    aside = {"type": "distributed", "member": "a", "value": [0.0, draw.between(0.5, 2.0)]}
     motions = {"close": {"node": "a1", **move}}
     return draw.table(False, nodes, members, loads={"aside": aside}, motions=motions)
 
@@ -148,7 +147,7 @@ def _twisted(draw: _Draw) -> Table:
 def _ropes(draw: _Draw) -> Table:
     """Three heavy ropes that cross each other, held by balls at their ends, which come nearer."""
     nodes, members, motions = Table(), Table(), Table()
-    z = 0.0
+    z, clamped = 0.0, draw.chance(0.6)
     for i, name in enumerate("abc"):
         angle = i * math.pi / 3.0 + draw.between(-0.2, 0.2)
         way, middle = (
@@ -159,6 +158,7 @@ def _ropes(draw: _Draw) -> Table:
         for k, sign in ((0, -0.5), (1, 0.5)):
             side = np.array([-math.sin(angle), math.cos(angle), 0.0])
             support = {"support": "hinge", "axis": side.round(6).tolist()} if k == 0 else {"support": "ball"}
+            support = {"support": "clamped"} if clamped else support
             nodes[f"{name}{k}"] = _held(*(middle + sign * way).round(6), **support)
             inward = -0.2 * sign * way
             motions[f"{name}{k}"] = {"node": f"{name}{k}", "displacement": [*inward[:2].round(6).tolist(), down]}
@@ -199,10 +199,9 @@ def _arcs(draw: _Draw) -> Table:
     size = draw.between(0.3, 0.5)
     # The first one opens upwards: its lowest point is above the top of the second one.
     top = y + size + (0.5 if round_too else 0.0)
-    guide = {"support": "slider", "direction": [0, 1]}
     nodes = {
-        "a0": _held(shift - size, round(top, 5), **guide),
-        "a1": _held(round(shift + size, 5), round(top, 5), **guide),
+        "a0": _held(shift - size, round(top, 5)),
+        "a1": _held(round(shift + size, 5), round(top, 5)),
     }
     nodes |= {"b0": _held(-0.5, 0.0), "b1": _held(0.5, 0.0)}
     second = {"shape": {"type": "arc", "angle": -round(math.pi, 12)}} if round_too else {}
