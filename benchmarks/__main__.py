@@ -1,8 +1,10 @@
 """Accuracy and speed measured: ``python -m benchmarks [NAME ...] [--save]``, from a clone of the repository.
 
 Names are order, loads, size, repeated, derivatives, net, path, motion, steps, code, accuracy, pieces, sweep, import,
-extremes and compared; left out, all are run.  ``--save`` writes what each prints into ``benchmarks/results`` too.  Four
-others, ``random``, ``jitter``, ``contact`` and ``ways``, stand alone, take options (``--help``) and half an hour each.
+extremes and compared; left out, all are run.  ``--save`` writes what each prints into ``benchmarks/results`` too.
+
+Others, ``random``, ``jitter``, ``contact``, ``members`` and ``ways``, stand alone, take options (``--help``) and half
+an hour each.
 
 Not a test: times are those of the machine at hand, the least of several or medians as the tables say.
 """
@@ -24,6 +26,7 @@ from .extremes import extremes
 from .importing import importing
 from .jitter import jitter
 from .many import many
+from .member_run import members
 from .motion import motion, step_cost
 from .pieces import pieces
 from .random_run import random_scenes
@@ -44,7 +47,7 @@ def main(words: list[str]) -> None:
     known |= {"steps": step_cost, "code": code, "accuracy": knob, "pieces": pieces, "sweep": many}
     known |= {"import": importing, "extremes": extremes, "compared": compared}
     alone: dict[str, Callable[[list[str]], None]] = {"random": random_scenes, "jitter": jitter}
-    alone |= {"contact": contact, "ways": ways}
+    alone |= {"contact": contact, "members": members, "ways": ways}
     if words[:1] and words[0] in alone:
         alone[words[0]](words[1:])
         return

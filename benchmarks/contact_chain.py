@@ -502,6 +502,14 @@ class Chain:
             energy -= self.strength / width * float(np.sum(g**2 * np.log1p(g / width)))
         return float(energy)
 
+    def pushed(self, x: Array, d: Array, grown: Array, width: float) -> tuple[Array, Array]:
+        """Gradient (links + nodes, dim) and Hessian of what else pushes links, here nothing.
+
+        ``grown`` leads from the unknowns to directions and places.
+        """
+        total = grown.shape[1] // self.dim
+        return np.zeros((self.X.shape[1], self.dim)), np.zeros((total, total))
+
     def residual(self, state: ChainState, s: float) -> Array:
         """How far the constraints are from met at a factor."""
         z = np.vstack([self.directions(state)[0], state.p])
@@ -524,6 +532,9 @@ class Chain:
         J = J.reshape(-1, total)
         H = np.zeros((total, total))
         grown = J.reshape(links + nodes, dim * total)
+        more, bent = self.pushed(x, d, grown, width)
+        gz += more.ravel()
+        H += bent
         for stop in self.stops:
             found = self.gaps(stop, x, d)
             near = np.flatnonzero(found.g < 0.0)
@@ -680,7 +691,8 @@ def _known(scene: Table) -> None:
     if in_space(scene):
         nodes = scene["nodes"].values()
         other |= {n["joint"] for n in nodes if n.get("joint", "rigid") not in ("rigid", "ball")}
-        other |= {n["support"] for n in nodes if n.get("support", "free") not in ("free", "clamped", "ball")}
+        held = [n for n in nodes if n.get("support") != "slider" or n.get("rotation", "fixed") != "fixed"]
+        other |= {n["support"] for n in held if n.get("support", "free") not in ("free", "clamped", "ball")}
         other |= set(scene.get("springs", {}))
     if other or springs or small or loads or stops:
         raise NotAChainError(f"not known here: {sorted(other) or (springs + small + loads + stops)[0]}")

@@ -20,7 +20,7 @@ from sfetcas.mathematics.threads import single_threaded
 
 from .contact_chain import Chain, ChainState, NotAChainError, in_space
 
-__all__ = ["ChainAnswer", "chain_contact", "free_way"]
+__all__ = ["ChainAnswer", "chain_contact", "emerged", "followed", "free_way", "settled"]
 
 Table = dict[str, Any]
 
@@ -103,8 +103,8 @@ def chain_contact(scene: Table, links: int | None = None) -> ChainAnswer:
     """
     links = links or LINKS[3 if in_space(scene) else 2]
     coarse, fine = Chain(scene, links), Chain(scene, 2 * links)
-    first, _ = _followed(coarse)
-    second, snaps = _followed(fine)
+    first, _ = followed(coarse)
+    second, snaps = followed(fine)
     size = fine.size
     one, two = coarse.shapes(first), fine.shapes(second)
     error = max(float(np.linalg.norm(one[name] - two[name], axis=1).max()) for name in two)
@@ -134,18 +134,18 @@ def free_way(scene: Table, links: int = 8) -> Array:
         What is not known here.
     """
     chain, seen = Chain({**scene, "contacts": {}}, links), list[Array]()
-    _followed(chain, seen)
+    followed(chain, seen)
     return np.pad(chain.size * np.vstack(seen), ((0, 0), (0, 3 - chain.dim)))
 
 
-def _followed(chain: Chain, seen: list[Array] | None = None) -> tuple[ChainState, list[float]]:
+def followed(chain: Chain, seen: list[Array] | None = None) -> tuple[ChainState, list[float]]:
     """From zero to factor 1: the state there, and factors at which it snapped."""
     state, s, step, snaps = chain.start(), 0.0, FIRST_STEP, []
     width = WIDTHS[0]
     while s < 1.0:
         step = min(step, 1.0 - s)
         last = step <= LAST_STEP
-        tried, count, unstable = _settled(chain, state, s + step, width, last)
+        tried, count, unstable = settled(chain, state, s + step, width, last)
         far = math.inf
         if tried is not None:
             far = float(np.abs(chain.points(tried) - chain.points(state)).max())
@@ -165,8 +165,8 @@ def _followed(chain: Chain, seen: list[Array] | None = None) -> tuple[ChainState
             seen.append(chain.points(state))
     before = chain.points(state)
     for wider, width in zip(WIDTHS, WIDTHS[1:]):
-        narrower = _emerged(chain, state, wider, width)
-        found = _settled(chain, narrower, 1.0, width, True)[0]
+        narrower = emerged(chain, state, wider, width)
+        found = settled(chain, narrower, 1.0, width, True)[0]
         if found is None:
             raise NotAChainError("no state found for the narrowest obstacles")
         state = found
@@ -175,7 +175,7 @@ def _followed(chain: Chain, seen: list[Array] | None = None) -> tuple[ChainState
     return state, snaps
 
 
-def _emerged(chain: Chain, state: ChainState, before: float, width: float) -> ChainState:
+def emerged(chain: Chain, state: ChainState, before: float, width: float) -> ChainState:
     """The same state, where it is deeper in obstacles than their new width allows pushed out by a harder barrier."""
     own = chain.strength
     try:
@@ -183,7 +183,7 @@ def _emerged(chain: Chain, state: ChainState, before: float, width: float) -> Ch
             if math.isfinite(chain.potential(state, 1.0, width, True)):
                 return state
             chain.strength *= 8.0
-            found = _settled(chain, state, 1.0, before, True)[0]
+            found = settled(chain, state, 1.0, before, True)[0]
             if found is None:
                 break
             state = found
@@ -192,7 +192,7 @@ def _emerged(chain: Chain, state: ChainState, before: float, width: float) -> Ch
     raise NotAChainError("no state found for narrower obstacles")
 
 
-def _settled(
+def settled(
     chain: Chain, state: ChainState, s: float, width: float, patient: bool
 ) -> tuple[ChainState | None, int, bool]:
     """Descent of the energy at a factor: the state (None without), the steps, whether it passed what is not convex.

@@ -24,7 +24,9 @@ from sfetcas.mathematics.quaternion import conjugate, from_rotation_vector, matr
 
 from .random_scenes import reordered, transformed
 
-__all__ = ["VARIANTS", "Defects", "Variant", "compared", "defects", "variant", "wrong"]
+__all__ = ["VARIANTS", "Defects", "Pushed", "Variant", "compared", "defects", "variant", "wrong"]
+
+Pushed = dict[str, list[tuple[float, Array]]]
 
 GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(8)
 
@@ -58,7 +60,7 @@ class Defects:
     bends: float
 
 
-def defects(step: Equilibrium, scene: Scene | None = None) -> Defects:
+def defects(step: Equilibrium, scene: Scene | None = None, pushed: Pushed | None = None) -> Defects:
     """How far an answer is from balance, from its nodes and from the differential equations of a beam.
 
     Parameters
@@ -66,8 +68,10 @@ def defects(step: Equilibrium, scene: Scene | None = None) -> Defects:
     step : Equilibrium
     scene : Scene, optional
         What acts and what resists; left out, that of the answer.
+    pushed : dict of str to list of (float, (3,)), optional
+        Forces on members at fractions of their lengths, N, besides the loads of the scene.
     """
-    return _Looked(step, step.model.scene if scene is None else scene).all()
+    return _Looked(step, step.model.scene if scene is None else scene, pushed or {}).all()
 
 
 def wrong(step: Equilibrium) -> list[str]:
@@ -244,8 +248,8 @@ def _unstable_there(step: Equilibrium, other: Variant) -> bool:
 class _Looked:
     """One answer with what acts on it."""
 
-    def __init__(self, step: Equilibrium, scene: Scene) -> None:
-        self.step, self.scene = step, scene
+    def __init__(self, step: Equilibrium, scene: Scene, pushed: Pushed) -> None:
+        self.step, self.scene, self.pushed = step, scene, pushed
         self.gravity = np.zeros(3) if self.scene.gravity is None else step.factor * np.array(self.scene.gravity)
         self.largest = 0.0
         self.inner = {name: step.along(name, [0.0, 1.0]) for name in self.scene.members}
@@ -307,6 +311,9 @@ class _Looked:
             there = self.step.along(name, [load.at])
             value, nothing = self.value(load, there["quaternion"]), np.zeros((1, 3))
             yield (value, nothing, there["position"]) if load.type == "force" else (nothing, value, there["position"])
+        for x, force in self.pushed.get(name, ()):
+            if x < 1.0:
+                yield force[None], np.zeros((1, 3)), self.step.along(name, [x])["position"]
         x, weights = self.points(name)
         there = self.step.along(name, x)
         spread = self.spread(name, x, there["quaternion"])
@@ -317,6 +324,7 @@ class _Looked:
         """Gauss points of a member between all places where something is not smooth, and weights in m."""
         section = self.scene.members[name].section
         cuts = {0.0, 1.0, *self.step.model.mesh.cuts.get(name, ())}
+        cuts |= {x for x, _ in self.pushed.get(name, ())}
         cuts |= set(self.scene.sections[section].breaks) if section is not None else set()
         for load in self.scene.loads.values():
             if load.member == name and load.profile is not None:
@@ -366,6 +374,9 @@ class _Looked:
             parts += [
                 (self.weights(member)[i], np.zeros(3), inner["position"][i]) for i, _ in sides if self.hung(member)
             ]
+            # What pushes the second end acts beyond its last section: forces are those before a place.
+            pushed = [force for x, force in self.pushed.get(member, ()) if x == 1.0 and ends[1] == name]
+            parts += [(force, np.zeros(3), here) for force in pushed]
         if node.support != "free":
             parts.append((*step.reaction(name), here))
         turned = step.quaternion(name)
@@ -440,7 +451,8 @@ class _Looked:
 
     def beam(self, name: str) -> tuple[float, float]:
         """Distance and angle at the ends of elements from where the equations of a beam lead to from their starts."""
-        cuts, line = self.step.model.mesh.cuts[name], self.scene.center_lines[name]
+        within = [x for x, _ in self.pushed.get(name, ())]
+        cuts, line = np.union1d(self.step.model.mesh.cuts[name], within), self.scene.center_lines[name]
         start, end = (self.state(name, np.nextafter(x, to)) for x, to in ((cuts[:-1], 1.0), (cuts[1:], 0.0)))
         x, h = cuts[:-1].copy(), np.diff(cuts) / SUBSTEPS
         now, step = start, (h * line.length)[:, None]
