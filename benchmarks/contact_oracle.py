@@ -20,7 +20,7 @@ from sfetcas.mathematics.threads import single_threaded
 
 from .contact_chain import Chain, ChainState, NotAChainError, in_space
 
-__all__ = ["ChainAnswer", "chain_contact", "emerged", "followed", "free_way", "settled"]
+__all__ = ["WIDTHS", "ChainAnswer", "chain_contact", "emerged", "followed", "free_way", "settled"]
 
 Table = dict[str, Any]
 

@@ -302,9 +302,14 @@ def _report_contact(name: str, entry: dict[str, Any], size: float) -> None:
         print(f"  contact {name}: nothing touches it" + ("" if entry["gap"] is None else f", gap {entry['gap']:.9g} m"))
         return
     several = isinstance(entry["member"], list)
-    for member, at, force in zip(
-        *(entry[k] if several else [entry[k]] for k in ("member", "at", "force")), strict=True
-    ):
+    told = {key: values if several else [values] for key, values in entry.items()}
+    if "other" in told:
+        for member, at, other, there, force in zip(
+            *(told[k] for k in ("member", "at", "other", "other_at", "force")), strict=True
+        ):
+            print(f"  contact {name}: {member} at {at:.9g} and {other} at {there:.9g}, force {_vector(force, size)} N")
+        return
+    for member, at, force in zip(*(told[k] for k in ("member", "at", "force")), strict=True):
         lies = isinstance(at, list)
         where = (
             f"lies on it from {at[0]:.9g} to {at[1]:.9g}, force over this" if lies else f"touches it at {at:.9g}, force"

@@ -114,6 +114,7 @@ def every_kind():
         {**plane, "springs": stopped, "loads": force},
         {**clamped, "sections": stretching, "springs": pulled, "motions": moved},
         {**clamped, "contacts": floor, "loads": force},
+        {**clamped, **_crossed(clamped), "loads": force},
         {**clamped, "sections": plastic, "loads": force},
         {**clamped, "tendons": {"t": {"way": [{"member": "m", "offset": 0.1}], "pull": 0.01}}},
         {**clamped, "tendons": {"t": {"way": [{"member": "m", "offset": 0.1}], "tension": 0.1, "friction": 0.2}}},
@@ -127,6 +128,16 @@ def every_kind():
         {**clamped, "fields": {"B": {"value": [0, 1]}}, "magnets": {"end": {"node": "B", "moment": [1, 0]}}},
     ):
         yield solve(Scene.from_dict(table)).last
+
+
+def _crossed(scene):
+    """A second member below the first, which it touches."""
+    nodes = {"C": {"position": [0.8, -0.1], "support": "clamped"}, "D": {"position": [2.0, -0.1]}}
+    return {
+        "nodes": {**scene["nodes"], **nodes},
+        "members": {**scene["members"], "below": {"nodes": ["C", "D"], "type": "rigid"}},
+        "contacts": {"pair": {"type": "members", "members": "all", "radius": 0.01}},
+    }
 
 
 def test_all_that_an_answer_tells_has_a_name_by_which_it_is_found():

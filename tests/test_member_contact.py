@@ -1,0 +1,236 @@
+"""Members that touch each other: against shooting, and looked at from outside."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import root
+
+from sfetcas import Scene, SceneError, SolveError, load, solve
+
+RADIUS = 0.01
+
+
+def leaves(force=3.0, steps=(1.0,), accuracy=1e-7, **changes):
+    """A cantilever above a shorter one, pulled down at its tip: the end of the lower one slides below it."""
+    table = {
+        "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8}},
+        "nodes": {
+            "a0": {"position": [0, 0.05], "support": "clamped"},
+            "a1": {"position": [1, 0.05]},
+            "b0": {"position": [0, 0], "support": "clamped"},
+            "b1": {"position": [0.8, 0]},
+        },
+        "members": {"a": {"nodes": ["a0", "a1"], "section": "s"}, "b": {"nodes": ["b0", "b1"], "section": "s"}},
+        "loads": {"tip": {"type": "force", "node": "a1", "value": [0, -force]}},
+        "contacts": {"pair": {"type": "members", "members": ["a", "b"], "radius": RADIUS}},
+        "analysis": {"accuracy": accuracy, "steps": list(steps)},
+    }
+    return Scene.from_dict(table | changes)
+
+
+def shot(force, start):
+    """Place on the upper member, size of the push and position of its tip, by shooting; unknowns begin at ``start``."""
+
+    def rod(begin, moment, pull, length):
+        def rate(_, y):
+            return [np.cos(y[2]), np.sin(y[2]), y[3], -(np.cos(y[2]) * pull[1] - np.sin(y[2]) * pull[0])]
+
+        return solve_ivp(rate, (0.0, length), [*begin, moment], rtol=1e-12, atol=1e-13).y[:, -1]
+
+    def ways(unknown):
+        s, push, angle, upper, lower = unknown
+        normal = np.array([-np.sin(angle), np.cos(angle)])
+        tip = np.array([0.0, -force])
+        touching = rod([0.0, 0.05, 0.0], upper, tip + push * normal, s)
+        end = rod(touching[:3], touching[3], tip, 1.0 - s)
+        return touching, end, rod([0.0, 0.0, 0.0], lower, -push * normal, 0.8), normal
+
+    def missed(unknown):
+        touching, end, below, normal = ways(unknown)
+        apart = touching[:2] - below[:2] - 2.0 * RADIUS * normal
+        return [*apart, touching[2] - unknown[2], end[3], below[3]]
+
+    found = root(missed, start, tol=1e-12)
+    assert np.abs(found.fun).max() < 1e-10
+    return found.x[0], found.x[1], ways(found.x)[1][:2]
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_the_end_of_a_member_below_another_one_by_shooting(dimension):
+    """In space the round members roll off each other: there it is an equilibrium, but none that lasts."""
+    analysis = {"accuracy": 1e-7, "unstable": "stay"}
+    step = solve(leaves(dimension=dimension, analysis=analysis)).last
+    touch = step.contacts["pair"]
+    assert (touch["member"], touch["other"], touch["other_at"]) == ("a", "b", 1.0)
+    angle = np.arctan2(-touch["force"][0], touch["force"][1])
+    moments = [step.along(member, [0.0])["moment"][0, 2] for member in "ab"]
+    at, push, tip = shot(3.0, [touch["at"], np.linalg.norm(touch["force"]), angle, *moments])
+    np.testing.assert_allclose(step.position("a1")[:2], tip, atol=1e-7)
+    # Ten and a hundred times the accuracy of positions: neither is one.
+    assert touch["at"] == pytest.approx(at, abs=1e-6)
+    assert np.linalg.norm(touch["force"]) == pytest.approx(push, rel=1e-5)
+    assert step.certificate.stable is (dimension == "plane")
+
+
+def penetration(step, pairs):
+    """Largest penetration among points of members sampled densely, m."""
+    deepest = 0.0
+    for first, second in pairs:
+        one, other = (step.along(member, np.linspace(0.0, 1.0, 801))["position"] for member in (first, second))
+        apart = np.linalg.norm(one[:, None] - other[None], axis=2)
+        deepest = max(deepest, 2.0 * RADIUS - float(apart.min()))
+    return deepest
+
+
+def test_before_they_touch_a_gap_is_told_and_what_touches_lets_go():
+    free, touching = solve(leaves(steps=(0.01, 1.0), accuracy=1e-5)).steps
+    assert free.contacts["pair"]["at"] is None
+    assert 0.0 < free.contacts["pair"]["gap"] < 0.03
+    assert abs(touching.contacts["pair"]["gap"]) < 1e-12
+    down = solve(leaves(steps=(1.0, 0.01), accuracy=1e-5)).last
+    assert down.contacts["pair"]["at"] is None
+    np.testing.assert_allclose(down.position("a1"), free.position("a1"), atol=1e-7)
+
+
+def crossed():
+    """A cantilever pressed across another one, in space."""
+    nodes = {
+        "a0": {"position": [0, 0, 0.05], "support": "clamped"},
+        "a1": {"position": [1, 0, 0.05]},
+        "b0": {"position": [0.6, -0.5, 0], "support": "clamped"},
+        "b1": {"position": [0.6, 0.5, 0]},
+    }
+    loads = {"tip": {"type": "force", "node": "a1", "value": [0, 0, -6]}}
+    return leaves(nodes=nodes, loads=loads, dimension="space", accuracy=1e-6)
+
+
+def test_the_push_between_crossing_members_is_normal_to_both():
+    step = solve(crossed()).last
+    touch = step.contacts["pair"]
+    force, gap = touch["force"], 2.0 * RADIUS
+    places = [(touch["member"], touch["at"]), (touch["other"], touch["other_at"])]
+    here, there = (step.along(member, [at])["position"][0] for member, at in places)
+    for member, at in places:
+        ends = step.along(member, [at - 1e-5, at + 1e-5])["position"]
+        assert abs(force @ (ends[1] - ends[0])) < 1e-7 * np.linalg.norm(force) * np.linalg.norm(ends[1] - ends[0])
+    np.testing.assert_allclose(here - there, gap * force / np.linalg.norm(force), atol=1e-10)
+    assert penetration(step, [("a", "b")]) < 1e-6 * gap + 1e-6
+    # What each clamp holds is what acts on its member.
+    np.testing.assert_allclose(step.reaction("b0")[0], force, atol=1e-9 * np.linalg.norm(force) + 1e-12)
+
+
+def test_units_make_no_difference():
+    """A thousandth of the lengths at the same forces times lengths squared over stiffness."""
+    small = {
+        "sections": {"s": {"EI3": 1e-6}},
+        "nodes": {
+            "a0": {"position": [0, 0.05e-3], "support": "clamped"},
+            "a1": {"position": [1e-3, 0.05e-3]},
+            "b0": {"position": [0, 0], "support": "clamped"},
+            "b1": {"position": [0.8e-3, 0]},
+        },
+        "contacts": {"pair": {"type": "members", "members": ["a", "b"], "radius": 1e-3 * RADIUS}},
+    }
+    one, other = (solve(leaves(accuracy=1e-5, **change)).last for change in ({}, small))
+    np.testing.assert_allclose(1e3 * other.position("a1"), one.position("a1"), atol=1e-9)
+    assert other.contacts["pair"]["at"] == pytest.approx(one.contacts["pair"]["at"], abs=1e-9)
+
+
+def test_a_hinged_bar_falls_onto_a_beam_and_bends_it():
+    nodes = {
+        "a0": {"position": [0, 0], "support": "clamped"},
+        "a1": {"position": [1, 0]},
+        "b0": {"position": [0.2, 0.1], "support": "hinge"},
+        "b1": {"position": [0.9, 0.15]},
+    }
+    loads = {"weight": {"type": "force", "node": "b1", "value": [0, -2]}}
+    members = {"a": {"nodes": ["a0", "a1"], "section": "s"}, "b": {"nodes": ["b0", "b1"], "type": "rigid"}}
+    step = solve(leaves(nodes=nodes, loads=loads, members=members, accuracy=1e-6)).last
+    touch = step.contacts["pair"]
+    assert {touch["member"], touch["other"]} == {"a", "b"}
+    push = touch["force"] if touch["member"] == "b" else -touch["force"]
+    end = step.position("b1")
+    # It turns about its hinge: nothing has a moment there.
+    at = step.along("b", [touch["at"] if touch["member"] == "b" else touch["other_at"]])["position"][0]
+    arm, weight = end - step.position("b0"), np.array([0.0, -2.0, 0.0])
+    moment = np.cross(at - step.position("b0"), push) + np.cross(arm, weight)
+    assert abs(moment[2]) < 1e-8
+
+
+def test_beams_that_lie_on_each_other_do_not_penetrate():
+    """The softer one is pressed on the stiffer one along its length."""
+    slides = {"support": "slider", "direction": [1, 0], "rotation": "hinge"}
+    nodes = {
+        "a0": {"position": [0, 0.05], "support": "hinge"},
+        "a1": {"position": [1, 0.05], **slides},
+        "b0": {"position": [0, 0], "support": "hinge"},
+        "b1": {"position": [1, 0], **slides},
+    }
+    members = {"a": {"nodes": ["a0", "a1"], "section": "s"}, "b": {"nodes": ["b0", "b1"], "section": "stiff"}}
+    loads = {"press": {"type": "distributed", "member": "a", "value": [0, -30]}}
+    sections = {"s": {"EI3": 1.0}, "stiff": {"EI3": 3.0}}
+    step = solve(leaves(nodes=nodes, members=members, loads=loads, sections=sections, accuracy=1e-3)).last
+    touch = step.contacts["pair"]
+    assert len(touch["at"]) > 3
+    # They push, and each other away from where they are; between the places they penetrate by less than the accuracy.
+    assert all(force[1] > 0.0 for force in touch["force"])
+    assert penetration(step, [("a", "b")]) < 1e-3
+    held = step.reaction("b0")[0] + step.reaction("b1")[0]
+    np.testing.assert_allclose(held, np.sum(touch["force"], axis=0), atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("contact", "sentence"),
+    [
+        ({"members": ["a", "b"]}, "no radius"),
+        ({"members": ["a", "a"], "radius": 0.01}, "twice"),
+        ({"members": [], "radius": 0.01}, "no member"),
+        ({"members": ["a", "b"], "radius": -1.0}, "radius"),
+        ({"members": ["a", "b"], "radius": 0.01, "side": [0, 1]}, "members touch each other"),
+        ({"members": ["a", "c"], "radius": 0.01}, "'c'"),
+    ],
+)
+def test_wrong_input_is_told_in_one_sentence(contact, sentence):
+    with pytest.raises(SceneError, match=sentence) as told:
+        leaves(contacts={"pair": {"type": "members", **contact}})
+    assert "\n" not in str(told.value)
+
+
+def test_what_contact_between_members_is_not_for():
+    floor = {"type": "plane", "point": [0, -1], "normal": [0, 1], "members": "all"}
+    pair = {"type": "members", "members": "all", "radius": 0.01}
+    with pytest.raises(SceneError, match="beside obstacles"):
+        leaves(contacts={"pair": pair, "floor": floor})
+    with pytest.raises(SceneError, match="accepted: with 'static'"):
+        leaves(analysis={"type": "path", "range": [0, 1]})
+
+
+def test_members_that_penetrate_in_the_beginning_are_refused():
+    with pytest.raises(SceneError, match=r"penetrate by 0\.01 m at .* of their lengths"):
+        solve(leaves(contacts={"pair": {"type": "members", "members": "all", "radius": 0.03}}))
+
+
+def test_forces_without_bound_are_no_answer():
+    """Held on both sides of a bar that is moved through them, nothing gives way."""
+    nodes = {
+        "a0": {"position": [0, 0.05], "support": "clamped"},
+        "a1": {"position": [1, 0.05], "support": "clamped"},
+        "b0": {"position": [0.5, 0], "support": "clamped"},
+        "b1": {"position": [0.5, 0.02]},
+    }
+    members = {"a": {"nodes": ["a0", "a1"], "type": "rigid"}, "b": {"nodes": ["b0", "b1"], "section": "s"}}
+    moved = {"up": {"node": "b0", "displacement": [0, 0.04]}}
+    with pytest.raises(SolveError):
+        solve(leaves(nodes=nodes, members=members, motions=moved, loads={}, accuracy=1e-4))
+
+
+def test_heavy_ropes_that_stretch_cross_each_other():
+    """As the problem of ropes that do not stretch, with a number of the same independent solution."""
+    scene = load(Path(__file__).parents[1] / "problems" / "ropes_crossing.toml").replace(expect=())
+    step = solve(scene.replace({"sections.rope.stretch": True})).last
+    # A tenth of the accuracy of positions, times the forces in the ropes, some ten times the one between them.
+    np.testing.assert_allclose(step.contacts["crossing"]["force"], [0.0, 0.0, 0.18474889], atol=1e-6)
+    assert step.along("carrying", [0.5])["position"][0, 2] == pytest.approx(-0.32603391, abs=1e-6)
+    assert step.certificate.stable is True
