@@ -14,6 +14,7 @@ import numpy as np
 
 from sfetcas.contact.closest import NEXT_TO
 from sfetcas.description.contacts import contact_radius
+from sfetcas.description.obstacles import members_of
 from sfetcas.description.scene import Scene
 from sfetcas.equilibria.solution import Equilibrium
 from sfetcas.mathematics.arrays import Array
@@ -59,8 +60,7 @@ def nearest(step: Equilibrium) -> Iterator[tuple[str, str, float, float, float, 
     for contact in scene.contacts.values():
         if not contact.between_members:
             continue
-        wanted = list(scene.members) if contact.members == "all" else list(contact.members or [contact.member])
-        names = [name for name in wanted if scene.members[name].type != "small"]
+        names = [name for name in members_of(contact, scene.members) if scene.members[name].type != "small"]
         for i, a in enumerate(names):
             for b in names[i:]:
                 if a == b and scene.members[a].type == "rigid":

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from sfetcas.analyses import solve
 from sfetcas.description.scene import Scene
 from sfetcas.description.scenefile import dump
+from sfetcas.equilibria import statics
 from sfetcas.equilibria.solution import Equilibrium
 from sfetcas.errors import SceneError, SolveError
 
@@ -76,7 +76,7 @@ def tried(kind: str, seed: int, seconds: float) -> MemberOutcome:
     signal.setitimer(signal.ITIMER_PROF, seconds)
     begin = time.process_time()
     try:
-        answer = solve(scene)
+        answer = statics.solve(scene)
     except (SceneError, SolveError) as error:
         taken = time.process_time() - begin
         signal.setitimer(signal.ITIMER_PROF, 0.0)

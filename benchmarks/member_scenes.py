@@ -77,7 +77,7 @@ def _bridge(draw: _Draw) -> Table:
         nodes |= {f"{name}0": _held(x, -0.5, 0.0), f"{name}1": _held(x + draw.between(-0.1, 0.1), 0.5, 0.0)}
         nodes[f"{name}1"] |= {"support": "slider", "direction": [0, 1, 0]}
         members[name] = {"nodes": [f"{name}0", f"{name}1"]}
-    guide = {"support": "slider", "direction": [0, 0, 1], "rotation": "ball"}
+    guide: dict[str, Any] = {"support": "slider", "direction": [0, 0, 1], "rotation": "ball"}
     nodes |= {"c0": _node(-0.6, draw.between(-0.2, 0.2), z), "m": _held(0.0, 0.0, z, **guide), "c1": _node(0.6, 0.0, z)}
     members |= {"c": {"nodes": ["c0", "m"]}, "d": {"nodes": ["m", "c1"]}}
     members["d"]["section"] = "of c"
@@ -109,7 +109,8 @@ def _parallel(draw: _Draw) -> Table:
     """Two beams on the same supports, pressed together along their length."""
     y, q = draw.clear(), draw.load(3.0, 100.0)
     held = "clamped" if draw.chance(0.5) else "hinge"
-    guide = {"support": "slider", "direction": [1, 0], "rotation": "fixed" if held == "clamped" else "hinge"}
+    turning = "fixed" if held == "clamped" else "hinge"
+    guide: dict[str, Any] = {"support": "slider", "direction": [1, 0], "rotation": turning}
     nodes = {"a0": _held(0.0, y, support=held), "a1": _held(1.0, y, **guide)}
     nodes |= {"b0": _held(0.0, 0.0, support=held), "b1": _held(draw.between(0.8, 1.2), 0.0, **guide)}
     members = {"a": {"nodes": ["a0", "a1"]}, "b": {"nodes": ["b0", "b1"]}}
@@ -136,7 +137,7 @@ def _twisted(draw: _Draw) -> Table:
     nodes = {"a0": _held(0.0, apart, 0.0), "b0": _held(0.0, -apart, 0.0)}
     nodes |= {"p": _held(1.0, 0.0, 0.0, support="slider", direction=[1, 0, 0])}
     nodes |= {"a1": _node(1.0, apart, 0.0), "b1": _node(1.0, -apart, 0.0)}
-    members = {"a": {"nodes": ["a0", "a1"]}, "b": {"nodes": ["b0", "b1"]}}
+    members: Table = {"a": {"nodes": ["a0", "a1"]}, "b": {"nodes": ["b0", "b1"]}}
     members |= {"pa": {"nodes": ["p", "a1"], "type": "rigid"}, "pb": {"nodes": ["p", "b1"], "type": "rigid"}}
     turn = {"node": "p", "rotation": [round(2.0 * math.pi * draw.between(0.3, 1.5), 4), 0.0, 0.0]}
     load = {"type": "force", "node": "p", "value": [pull, 0.0, 0.0]}

@@ -314,11 +314,11 @@ class _Looked:
         for x, force in self.pushed.get(name, ()):
             if x < 1.0:
                 yield force[None], np.zeros((1, 3)), self.step.along(name, [x])["position"]
-        x, weights = self.points(name)
-        there = self.step.along(name, x)
-        spread = self.spread(name, x, there["quaternion"])
+        places, weights = self.points(name)
+        there = self.step.along(name, places)
+        spread = self.spread(name, places, there["quaternion"])
         if spread.any():
-            yield weights[:, None] * spread, np.zeros((len(x), 3)), there["position"]
+            yield weights[:, None] * spread, np.zeros((len(places), 3)), there["position"]
 
     def points(self, name: str) -> tuple[Array, Array]:
         """Gauss points of a member between all places where something is not smooth, and weights in m."""

@@ -141,7 +141,11 @@ class MemberContact:
 
     def clear(self, fields: Fields) -> bool:
         """Whether no members penetrate each other."""
-        return not any(near.gap < -self.tolerance for near in self.closest.found(fields, 0.0))
+        return self.penetration(fields) <= self.tolerance
+
+    def penetration(self, fields: Fields) -> float:
+        """How deep members penetrate each other at most, m: between the places of a line, where nothing stops them."""
+        return max((-near.gap for near in self.closest.found(fields, 0.0)), default=0.0)
 
     def unstopped(self, before: Solved, after: Solved) -> bool:
         """Whether members neither penetrate nor pass each other from one state to another."""

@@ -147,6 +147,8 @@ class MemberContactSteps:
                 error += difference
                 break
             now = finer
+            # What members penetrate each other by is an error of positions too.
+            error = max(error, self.run.penetration(now.fields) / self.scene.size)
             if error <= accuracy:
                 break
             smooth *= 0.1
