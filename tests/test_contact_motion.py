@@ -96,6 +96,16 @@ def test_a_ball_bounces(dimension, integrator):
     assert balance(motion).max() < 1e-6
 
 
+def test_bounces_that_are_no_larger_than_the_accuracy_end():
+    """Not every one of them is a step."""
+    table = ball({**FLOOR, "restitution": 0.5}, [0, 1], {"end": 1.36, "step": 0.02})
+    table["nodes"]["C"]["position"] = [0, 1.2]
+    motion = solve(made(table))
+    assert len(motion.events) < 30
+    assert motion.events[-1].acts
+    assert motion.last.contacts["stop"]["force"][1] == pytest.approx(20.0)
+
+
 def test_without_restitution_it_stays_and_with_all_of_it_nothing_is_lost():
     still = solve(made(ball(FLOOR, [0, 1], {"end": 1.0, "step": 0.05})))
     (event,) = still.events
