@@ -64,7 +64,7 @@ class MemberContactSteps:
             self.run.refuse_penetrating(zero.fields)
             self.checked = True
         if self.last is None:
-            alone = self._alone(pilot, factor)
+            alone = self._alone(pilot, factor, zero)
             if alone is not None:
                 return alone
         notes: tuple[str, ...] = () if pilot.model.conservative else (NO_ENERGY,)
@@ -78,8 +78,17 @@ class MemberContactSteps:
         state = pilot.equations.start(nothing)
         return Solved(pilot, state, nothing, pilot.equations.at(state, nothing), 0.0)
 
-    def _alone(self, pilot: Prepared, factor: float) -> Equilibrium | None:
+    def _begun(self, pilot: Prepared, factor: float, zero: Solved) -> Solved | None:
+        """Where a small share of the loads puts what has no place without loads; None where that is not near."""
+        bent = self.ways.bent(pilot, factor)
+        near = bent is not None and self.run.turned(zero.fields, bent.fields) < NEAR
+        return bent if bent is not None and near and self.run.unstopped(zero, bent) else None
+
+    def _alone(self, pilot: Prepared, factor: float, zero: Solved) -> Equilibrium | None:
         """The answer in which nothing touches, where the growing loads lead there; else None."""
+        # What has no place without loads may be led through other members before they are looked at.
+        if (pilot.lacks_slack or pilot.diagnosis.mobility) and self._begun(pilot, factor, zero) is None:
+            return None
         try:
             found = self.ways.grown_from_zero(pilot, factor, self.run.unstopped)
         except SolveError as error:
@@ -101,9 +110,8 @@ class MemberContactSteps:
             found = self.run.follow(mesh, lambda t: lambda model: model.loading(0.0, t), zero)
             start = self._known(found, factor)
         elif pilot.lacks_slack or pilot.diagnosis.mobility:
-            bent = self.ways.bent(pilot, factor)
-            near = bent is not None and self.run.turned(zero.fields, bent.fields) < NEAR
-            if bent is not None and near and self.run.unstopped(zero, bent):
+            bent = self._begun(pilot, factor, zero)
+            if bent is not None:
                 begin, start = bent.factor, bent
             elif pilot.diagnosis.mobility:
                 begin = SMALL * factor
