@@ -35,7 +35,7 @@ def rows(printed):
 def test_benchmark_of_another_name_is_refused():
     accepted = (
         "net, path, motion, steps, code, accuracy, pieces, sweep, import, extremes, compared, "
-        "random, jitter, contact, ways"
+        "random, jitter, contact, members, ways"
     )
     with pytest.raises(SystemExit, match=rf"found benchmark 'nets', accepted: .*{accepted}$"):
         main(["nets"])
