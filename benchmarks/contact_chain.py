@@ -179,7 +179,7 @@ class Chain:
         self._held(scene)
         self.stops = [self._stop(name, c, scene) for name, c in scene.get("contacts", {}).items()]
         rounds = [s.radius for s in self.stops if not s.flat]
-        self.thin = min(rounds, default=1.0)
+        self.thin, self.longest = min(rounds, default=1.0), 1.0
 
     def start(self) -> ChainState:
         """The undeformed state."""

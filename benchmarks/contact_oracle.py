@@ -143,7 +143,7 @@ def followed(chain: Chain, seen: list[Array] | None = None) -> tuple[ChainState,
     state, s, step, snaps = chain.start(), 0.0, FIRST_STEP, []
     width = WIDTHS[0]
     while s < 1.0:
-        step = min(step, 1.0 - s)
+        step = min(step, 1.0 - s, chain.longest)
         last = step <= LAST_STEP
         tried, count, unstable = settled(chain, state, s + step, width, last)
         far = math.inf

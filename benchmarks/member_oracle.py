@@ -20,7 +20,7 @@ from sfetcas.mathematics.threads import single_threaded
 from .contact_chain import Chain, ChainState, NotAChainError
 from .contact_oracle import WIDTHS, emerged, followed, settled
 
-__all__ = ["MemberChain", "RodAnswer", "near_answer", "rods_in_contact"]
+__all__ = ["LINKS", "MemberChain", "RodAnswer", "near_answer", "rods_in_contact"]
 
 Table = dict[str, Any]
 
@@ -88,6 +88,9 @@ class MemberChain(Chain):
                     distance += [both] * len(pairs)
         self.one, self.other, self.distance = np.array(one, int), np.array(other, int), np.array(distance)
         self.owners, self.thin = owners, 0.5 * min(distance, default=1.0)
+        # What is led does not pass through anything in one increment.
+        led = [np.linalg.norm(m["displacement"]) for m in scene.get("motions", {}).values() if "displacement" in m]
+        self.longest = self.thin * self.size / max(led, default=self.thin * self.size)
 
     def _along(self, scene: Table, owners: dict[int, str], i: int, j: int) -> float:
         """Length between two links along members that are one or have a common node."""

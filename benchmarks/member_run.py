@@ -25,7 +25,7 @@ from sfetcas.errors import SceneError, SolveError
 
 from .contact_chain import QUARTERS, NotAChainError
 from .member_checks import touches, wrong_contacts
-from .member_oracle import near_answer, rods_in_contact
+from .member_oracle import LINKS, RodAnswer, near_answer, rods_in_contact
 from .member_scenes import KINDS, member_scene
 from .worker import Worker
 
@@ -99,28 +99,37 @@ def _chained(table: dict[str, Any], step: Equilibrium | None) -> tuple[str, str]
         found = rods_in_contact(table)
     except NotAChainError as error:
         return "unchecked", f"no chain: {error}"
-    words = f"chain: error {found.error:.1e}, force {sum(found.forces.values()):.4g}, energy {found.energy:.6g}"
-    words += f", snaps {', '.join(f'{s:.3f}' for s in found.snaps)}" if found.snaps else ""
-    if step is None:
-        return "unchecked", words
-    forces = sum(float(np.linalg.norm(one.force)) for one in touches(step))
-    apart = max(
-        float(np.abs(step.along(name, QUARTERS)["position"] - there).max()) for name, there in found.members.items()
-    )
-    most = APART * found.size + 1.5 * found.error
-    beside = abs(forces - sum(found.forces.values()))
-    if apart <= most and beside <= FORCES * max(forces, 1e-3) + 3.0 * len(found.forces) * found.force_error:
-        return "solved", words
-    words = f"apart by {apart:.1e}, forces {forces:.4g}, energy {step.energy['total']:.6g}; {words}"
+    if step is None or _same(step, found):
+        return "unchecked" if step is None else "solved", _said(found)
+    words = f"chain {_apart(step, found):.1e} away, {_said(found)}, energy of the answer {step.energy['total']:.6g}"
     try:
-        near = near_answer(table, step)
+        finer = near_answer(table, step, 2 * LINKS[3 if table["dimension"] == "space" else 2])
     except NotAChainError as error:
         return "OTHER", f"{words}; from the answer no chain: {error}"
-    apart = max(
-        float(np.abs(step.along(name, QUARTERS)["position"] - there).max()) for name, there in near.members.items()
+    words += f"; from the answer {_apart(step, finer):.1e} away, {_said(finer)}"
+    # Where the finer chain is between both, the coarse one was not fine enough.
+    between = max(float(np.abs(there - found.members[name]).max()) for name, there in finer.members.items())
+    near = _same(step, finer) and between <= 10.0 * (found.error + finer.error)
+    return "solved" if near else "OTHER", words
+
+
+def _apart(step: Equilibrium, found: RodAnswer) -> float:
+    """Largest distance of places along members, m."""
+    return max(
+        float(np.abs(step.along(name, QUARTERS)["position"] - there).max()) for name, there in found.members.items()
     )
-    words += f"; from the answer apart by {apart:.1e}, error {near.error:.1e}, force {sum(near.forces.values()):.4g}"
-    return "OTHER", words
+
+
+def _same(step: Equilibrium, found: RodAnswer) -> bool:
+    """Whether places and forces are the same, besides the errors of the chain."""
+    force = sum(float(np.linalg.norm(one.force)) for one in touches(step))
+    beside = abs(force - sum(found.forces.values())) - 3.0 * len(found.forces) * found.force_error
+    return _apart(step, found) <= APART * found.size + 1.5 * found.error and beside <= FORCES * max(force, 1e-3)
+
+
+def _said(found: RodAnswer) -> str:
+    words = f"chain's error {found.error:.1e}, force {sum(found.forces.values()):.4g}, energy {found.energy:.6g}"
+    return words + (f", snaps {', '.join(f'{s:.3f}' for s in found.snaps)}" if found.snaps else "")
 
 
 def members(arguments: Sequence[str] = ()) -> None:
@@ -141,9 +150,9 @@ def members(arguments: Sequence[str] = ()) -> None:
                     end = "slow" if failed in ("CRASH", "too slow") else "ERROR"
                     found = MemberOutcome(kind, seed, end, asked.seconds, failed)
                 outcomes.append(found)
-                if found.end not in ("solved", "unchecked"):
+                if found.end != "solved":
                     print(f"- {kind} {seed}: {found.end} ({found.seconds:.1f} s): {found.words}", flush=True)
-                    if asked.save:
+                    if asked.save and found.end != "unchecked":
                         name = f"{found.end}_{kind}_{seed}.toml"
                         dump(Scene.from_dict(member_scene(kind, seed)), asked.save / name)
     finally:
