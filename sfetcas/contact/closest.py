@@ -34,7 +34,7 @@ MOST_PIECES = 1_000
 """Straight pieces of a member at most, for which slender ones are longer."""
 
 LEAST = 1e-6
-"""Least curvature of the distance, over that of a circle of this radius, with which Newton's steps are made."""
+"""Least curvature of half the square of the distance with which Newton's steps are made; it is one across a line."""
 
 BEND = 1e-6
 """Fraction of a length over which tangents are differenced for the curvature of a centre line."""
@@ -44,6 +44,9 @@ ITERATIONS, ARRIVED = 40, 1e-13
 
 SAME = 0.5
 """Minima nearer to each other than this part of the distance of the centre lines are one, along both members."""
+
+ALIKE = 1e-9
+"""Share of a distance by which a shorter one is no other: rounding is far below, the curve of a member far above."""
 
 NEXT_TO = 0.95
 """Part of half a turn of the smallest circle within which places along members are not near to each other."""
@@ -127,14 +130,15 @@ class Closest:
         x = {member: self.samples(fields, member) for member in self.members}
         points = {member: fields.positions(member, x[member]) for member in self.members}
         near: list[Near] = []
-        for pair, at in self._candidates(points, x, reach, pairs):
-            near += self._minima(fields, pair, at, reach)
+        longest = max(float(np.linalg.norm(np.diff(points[m], axis=0), axis=1).max()) for m in self.members)
+        for pair, at in self._candidates(points, x, reach, pairs, longest):
+            near += self._minima(fields, pair, at, reach, longest)
         return near
 
     # -- pieces -----------------------------------------------------------------------------------
 
     def _candidates(
-        self, points: dict[str, Array], x: dict[str, Array], reach: float, pairs: Sequence[Pair]
+        self, points: dict[str, Array], x: dict[str, Array], reach: float, pairs: Sequence[Pair], longest: float
     ) -> Iterator[tuple[Pair, Array]]:
         """For each pair of members places (2, n) on both where pieces are nearer to each other than those beside them.
 
@@ -145,7 +149,6 @@ class Closest:
         middles = [0.5 * (points[member][1:] + points[member][:-1]) for member in self.members]
         starts = np.concatenate([[0], np.cumsum([len(part) for part in middles])])
         owners = np.repeat(np.arange(len(middles)), np.diff(starts))
-        longest = max(float(np.linalg.norm(np.diff(points[m], axis=0), axis=1).max()) for m in self.members)
         # A piece is at most half of it from its middle, and its arc rises above it by less than a quarter.
         limit = self.largest + reach + 1.5 * longest
         found = cKDTree(np.concatenate(middles)).query_pairs(limit, output_type="ndarray")
@@ -183,18 +186,18 @@ class Closest:
 
     # -- curves -----------------------------------------------------------------------------------
 
-    def _minima(self, fields: Fields, pair: Pair, at: Array, reach: float) -> Iterator[Near]:
-        """Minima between the curves from places (2, n) on both; each once."""
+    def _minima(self, fields: Fields, pair: Pair, at: Array, reach: float, longest: float) -> Iterator[Near]:
+        """Minima between the curves from places (2, n) on both, in steps of some length (m) at most; each once."""
         a, b = pair.members
         lengths = np.array([[self.lengths[a]], [self.lengths[b]]])
         at = np.clip(at, 0.0, 1.0)
         begin = at.copy()
         for _ in range(ITERATIONS):
-            slope, curvature, apart, _ = self._distance(fields, pair, at)
-            step = _downhill(slope, curvature, apart, at) / lengths
+            slope, curvature, apart = self._half_square(fields, pair, at)
+            step = _downhill(slope, curvature, at) / lengths
             # As long as the pieces at most: a minimum is not far from where pieces are nearest.
-            longest = np.maximum(0.25 * apart, self.largest) / lengths
-            step = np.clip(step, -longest, longest)
+            limit = np.maximum(0.25 * apart, longest) / lengths
+            step = np.clip(step, -limit, limit)
             after = np.clip(at + step, 0.0, 1.0)
             moved, at = np.abs(after - at).max(initial=0.0), after
             if moved < ARRIVED:
@@ -239,9 +242,9 @@ class Closest:
             return []
         length = self.lengths[second]
         for _ in range(ITERATIONS):
-            slope, curvature, apart, _ = self._distance(fields, pair, at)
-            step = -slope[1] / np.maximum(np.abs(curvature[1, 1]), LEAST / apart)
-            step = np.clip(step, -self.largest, self.largest) / length
+            slope, curvature, _ = self._half_square(fields, pair, at)
+            step = -slope[1] / np.maximum(np.abs(curvature[1, 1]), LEAST)
+            step = np.clip(step, -longest, longest) / length
             after = np.clip(at[1] + step, 0.0, 1.0)
             moved, at[1] = np.abs(after - at[1]).max(), after
             if moved < ARRIVED:
@@ -286,6 +289,14 @@ class Closest:
         curvature[0, 1] = curvature[1, 0] = (-both - along[0] * along[1]) / apart
         return along, curvature, apart, n
 
+    def _half_square(self, fields: Fields, pair: Pair, at: Array) -> tuple[Array, Array, Array]:
+        """Slope (2, n), m, and curvature (2, 2, n) of half the square of the distance, and the distance (n,), m.
+
+        Its minima are those of the distance, which has a corner where centre lines cross.
+        """
+        slope, curvature, apart, _ = self._distance(fields, pair, at)
+        return apart * slope, apart * curvature + slope[:, None] * slope[None, :], apart
+
     def _curvature(self, fields: Fields, member: str, x: Array) -> Array:
         """Vectors of curvature (n, 3) of a centre line, 1/m."""
         low, high = np.maximum(x - BEND, 0.0), np.minimum(x + BEND, 1.0)
@@ -293,7 +304,7 @@ class Closest:
         return np.asarray(change / ((high - low) * self.lengths[member])[:, None])
 
 
-def _downhill(slope: Array, curvature: Array, apart: Array, at: Array) -> Array:
+def _downhill(slope: Array, curvature: Array, at: Array) -> Array:
     """Steps (2, n) in both arc lengths, m, towards the minimum; none beyond an end of a member.
 
     Downhill also where the distance is curved the other way, or not at all: of the curvatures the sizes are taken.
@@ -302,18 +313,18 @@ def _downhill(slope: Array, curvature: Array, apart: Array, at: Array) -> Array:
     both = free.all(axis=0)
     mean, half = 0.5 * (curvature[0, 0] + curvature[1, 1]), 0.5 * (curvature[0, 0] - curvature[1, 1])
     across = np.where(both, curvature[0, 1], 0.0)
-    least, root = LEAST / apart, np.hypot(half, across)
-    sizes = np.maximum(np.abs([mean + root, mean - root]), least)
+    root = np.hypot(half, across)
+    sizes = np.maximum(np.abs([mean + root, mean - root]), LEAST)
     angle = 0.5 * np.arctan2(across, half)
     c, s = np.cos(angle), np.sin(angle)
     first, second = (c * slope[0] + s * slope[1]) / sizes[0], (c * slope[1] - s * slope[0]) / sizes[1]
     together = -np.array([c * first - s * second, s * first + c * second])
-    alone = -slope / np.maximum(np.abs([curvature[0, 0], curvature[1, 1]]), least)
+    alone = -slope / np.maximum(np.abs([curvature[0, 0], curvature[1, 1]]), LEAST)
     return np.where(both, together, np.where(free, alone, 0.0))
 
 
 def _locally_least(i: Index, j: Index, distances: Array, columns: int) -> Array:
-    """Of pairs of pieces those that are not farther apart than any pair beside them."""
+    """Of pairs of pieces those that are not farther apart than any pair beside them; of equal ones the first."""
     width = columns + 2
     keys = (i + 1) * width + j + 1
     order = np.argsort(keys)
@@ -325,7 +336,9 @@ def _locally_least(i: Index, j: Index, distances: Array, columns: int) -> Array:
                 wanted = keys + di * width + dj
                 place = np.clip(np.searchsorted(ordered, wanted), 0, len(ordered) - 1)
                 beside = np.where(ordered[place] == wanted, values[place], np.inf)
-                least &= distances <= beside
+                # Where members are parallel, rounding shall not make a minimum of each piece.
+                earlier = di < 0 or (di == 0 and dj < 0)
+                least &= distances < beside * (1.0 - ALIKE) if earlier else distances <= beside * (1.0 + ALIKE)
     return least
 
 

@@ -20,6 +20,7 @@ from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mechanics.accuracy import roughness
+from ..mechanics.contact_points import undeformed_distance
 from ..mechanics.equations import State
 from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
@@ -132,12 +133,14 @@ class MemberContact:
             Names them, where and how deep.
         """
         deep = [near for near in self.closest.found(fields, 0.0) if near.gap < -max(self.tolerance, 1e-9 * near.apart)]
-        for near in sorted(deep, key=lambda one: one.gap)[:1]:
-            (a, b), (s, t) = near.members, near.at
-            found = f"members {a!r} and {b!r} penetrate" if a != b else f"member {a!r} penetrates itself"
-            where = f"at {s:.4g} and {t:.4g} of their lengths" if a != b else f"at {s:.4g} and {t:.4g} of its length"
-            message = f"{found} by {-near.gap:.3g} m {where} in the undeformed scene, accepted: members that do not"
-            raise SceneError(message, ("contacts", near.contact))
+        if not deep:
+            return
+        near = min(deep, key=lambda one: one.gap)
+        (a, b), (s, t) = near.members, near.at
+        found = f"members {a!r} and {b!r} penetrate" if a != b else f"member {a!r} penetrates itself"
+        where = f"at {s:.4g} and {t:.4g} of {'their lengths' if a != b else 'its length'}"
+        message = f"{found} by {-near.gap:.3g} m {where} in the undeformed scene, accepted: members that do not"
+        raise SceneError(message, ("contacts", near.contact))
 
     def clear(self, fields: Fields) -> bool:
         """Whether no members penetrate each other."""
@@ -186,10 +189,10 @@ class MemberContact:
         rows = {name: i for i, name in reversed(list(enumerate(target.row_names)))}
         unit, axes = target.scales.length, target.element.axes
         for point in target.mesh.points:
-            lines = [self.scene.center_lines[member] for member in point.members]
-            start = [line.positions(np.array([at]))[0] for line, at in zip(lines, point.at, strict=True)]
-            now = [source.fields.positions(m, np.array([at]))[0] for m, at in zip(point.members, point.at, strict=True)]
-            change = ((now[0] - now[1]) - (start[0] - start[1])) / unit
+            first, second = (
+                source.fields.positions(m, np.array([at]))[0] for m, at in zip(point.members, point.at, strict=True)
+            )
+            change = ((first - second)[:axes] - undeformed_distance(self.scene, point)[:axes]) / unit
             for k in range(axes):
                 y[numbers[f"{point.between}, {'xyz'[k]}"]] = change[k]
             for side in (0, 1):
@@ -351,17 +354,16 @@ class MemberContact:
 
         What was nearest before, and is nearest after, must not have changed sides.
         """
+        return bool(self._crossings(before, after) or self._crossings(after, before))
+
+    def _crossings(self, before: Fields, after: Fields) -> list[Near]:
+        """Where members are nearest in one state that are on other sides of each other in another one."""
         moved = 0.0
         for member in self.closest.members:
             x = self.closest.samples(after, member)
             apart = after.positions(member, x) - before.positions(member, x)
             moved = max(moved, float(np.linalg.norm(apart, axis=1).max()))
-        reach = 2.0 * moved
-        return any(
-            self._crossed(near, other)
-            for one, other in ((before, after), (after, before))
-            for near in self.closest.found(one, reach)
-        )
+        return [near for near in self.closest.found(before, 2.0 * moved) if self._crossed(near, after)]
 
     @staticmethod
     def _crossed(near: Near, fields: Fields) -> bool:
@@ -388,6 +390,10 @@ class MemberContact:
             part, lines = min(1.0, now.part + step), set(self.lines)
             points = self.points(now.solved)
             there = self.resolved(mesh, points, now.solved, way(part))
+            crossings = [] if there is None else self._crossings(now.solved.fields, there.fields)
+            if crossings:
+                # Members thinner than the step is long touch where they were nearest before.
+                there = self.resolved(mesh, (*points, *map(_begun, crossings)), now.solved, way(part))
             if there is not None and (
                 self.turned(now.solved.fields, there.fields) > STRIDE or self.passed(now.solved.fields, there.fields)
             ):
@@ -477,12 +483,6 @@ class MemberContact:
         prepared, loading = found.prepared, found.loading
         state = prepared.nudged(found, loading, NUDGE)
         return replace(found, state=state, point=prepared.equations.at(state, loading))
-
-    def factors(self, begin: float, end: float) -> list[float]:
-        """Factors from one to another, where histories have knots."""
-        low, high = min(begin, end), max(begin, end)
-        knots = {t for history in self.scene.histories.values() for t in history.knots if low < t < high}
-        return [begin, *sorted(knots, reverse=end < begin), end]
 
     def notes(self, begin: float, end: float) -> tuple[str, ...]:
         """What is said of the last way, between two factors."""

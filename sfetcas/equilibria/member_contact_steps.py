@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..contact.member_contact import MemberContact
+from ..description.inserting import stops_between
 from ..errors import LIMITS, SolveError, Status
 from ..mechanics.accuracy import roughness
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model
+from ..solvers.continuation import between
 from ..solvers.prepared import Prepared, Solved
 from .force_balance import refuse_lost_forces
 from .meshing import Meshing
@@ -108,22 +112,21 @@ class MemberContactSteps:
             mesh = replace(start.model.mesh, points=())
         elif self.scene.histories:
             found = self.run.follow(mesh, lambda t: lambda model: model.loading(0.0, t), zero)
-            start = self._known(found, factor)
+            start = self._known(found)
         elif pilot.lacks_slack or pilot.diagnosis.mobility:
             bent = self._begun(pilot, factor, zero)
             if bent is not None:
                 begin, start = bent.factor, bent
             elif pilot.diagnosis.mobility:
                 begin = SMALL * factor
-                start = self._known(self.run.relaxed(mesh, zero, lambda model: model.loading(begin)), factor)
+                start = self._known(self.run.relaxed(mesh, zero, lambda model: model.loading(begin)))
         notes: tuple[str, ...] = ()
-        stops = self.run.factors(begin, factor)
-        for a, b in zip(stops, stops[1:], strict=False):
-            start = self._known(self.run.follow(mesh, _between(a, b), start), factor)
+        for a, b in itertools.pairwise(stops_between(self.scene, begin, factor)):
+            start = self._known(self.run.follow(mesh, partial(_on_way, a, b), start))
             notes += self.run.notes(a, b)
         return start, notes
 
-    def _known(self, found: Solved | None, factor: float) -> Solved:
+    def _known(self, found: Solved | None) -> Solved:
         if found is None:
             detail = "the loads growing from zero could not be followed while members touch each other"
             raise SolveError(
@@ -192,10 +195,6 @@ class MemberContactSteps:
         return there
 
 
-def _between(a: float, b: float) -> Callable[[float], Callable[[Model], Loading]]:
-    """The way of the loads from one factor to another."""
-
-    def way(part: float) -> Callable[[Model], Loading]:
-        return lambda model: model.loading(a + part * (b - a))
-
-    return way
+def _on_way(begin: float, end: float, part: float) -> Callable[[Model], Loading]:
+    """The loading of a model on the way from one factor to another."""
+    return lambda model: between(model, begin, end)(part)

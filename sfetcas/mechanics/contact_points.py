@@ -22,6 +22,7 @@ from typing import ClassVar, final
 import casadi as ca
 import numpy as np
 
+from ..description.scene import Scene
 from ..mathematics.arrays import Array, numbers
 from .mesh import ContactPoint
 from .parts import Parts
@@ -103,16 +104,16 @@ class Gap(Term):
         return [-lam[0]]
 
 
-def undeformed_distance(parts: Parts, point: ContactPoint) -> Array:
-    """Vector (axes,) between the undeformed centre lines where a point begins, m."""
-    lines = [parts.scene.center_lines[member] for member in point.members]
+def undeformed_distance(scene: Scene, point: ContactPoint) -> Array:
+    """Vector (3,) from the second to the first undeformed centre line where a point begins, m."""
+    lines = [scene.center_lines[member] for member in point.members]
     first, second = (line.positions(np.array([at]))[0] for line, at in zip(lines, point.at, strict=True))
-    return np.asarray(first - second)[: parts.element.axes]
+    return np.asarray(first - second)
 
 
 def contact_points_in(parts: Parts) -> Iterator[One]:
     """Terms of the points where members touch each other."""
-    segments, unit, space = parts.segments, parts.scales.length, parts.element.space
+    segments, unit, axes, space = parts.segments, parts.scales.length, parts.element.axes, parts.element.space
     for point in parts.mesh.points:
         between = segments.place(point.between)
         slides = [segments.place(point.place(i)) if point.slides[i] else GROUND for i in (0, 1)]
@@ -120,7 +121,7 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
         yield One(Apart(space), point.name, "", np.zeros(0), (), (between, *starts, *slides), point.name)
         for side, member in enumerate(point.members):
             yield from guided(parts, Meeting, (point.name,) * 2, (member, point.at[side]), slides[side], side == 1)
-        data = np.append(undeformed_distance(parts, point), point.distance) / unit
-        normal = np.zeros(0) if point.normal is None else np.array(point.normal)[: parts.element.axes]
+        data = np.append(undeformed_distance(parts.scene, point)[:axes], point.distance) / unit
+        normal = np.zeros(0) if point.normal is None else np.array(point.normal)[:axes]
         gap = Gap(space, point.normal is not None)
         yield One(gap, point.name, "", numbers(np.concatenate([normal, data])), (), (between,), f"{point.name}, gap")
