@@ -69,6 +69,9 @@ SOURCES: list[Callable[[Parts], Iterable[One]]] = [
 ]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
 
+SHARED_ROWS = {"rings": "ring", "contacts": "point of contact"}
+"""What rows are called to which several terms add their shares, by the tables of these; else those of tendons."""
+
 KNOWS_NO_STEPS = "a model by itself knows no steps, accepted: solve(scene)"
 """What is said of scenes whose load steps come one after the other."""
 
@@ -415,6 +418,7 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         blocks.append(Block("closings", len(model.positions.rows), f"{why}; the multipliers are forces"))
     for group in model.connections:
         if group.rows:
-            name = type(group.kind).__name__.lower() if not group.kind.shares_row else "length of tendon"
+            shared = SHARED_ROWS.get(group.kind.table, "length of tendon") if group.kind.shares_row else ""
+            name = shared or type(group.kind).__name__.lower()
             blocks.append(Block(f"{name} rows", len(group.rows), enumerated(tuple(dict.fromkeys(group.names)))))
     return tuple(blocks)
