@@ -216,8 +216,8 @@ def test_what_is_not_solved_is_refused():
     with pytest.raises(SceneError, match="found a section with a law of stretch of a rigid member"):
         scene.replace({"members.m.type": "rigid"})
     floor = {"type": "plane", "point": [0, -1], "normal": [0, 1], "member": "m"}
-    with pytest.raises(SceneError, match="found the member 'm', which has a law of stretch, accepted"):
-        scene.replace({"contacts.floor": floor})
+    with pytest.raises(SceneError, match="found an obstacle of 'm', which has a law or stretches with"):
+        scene.replace({"contacts.floor": floor, "analysis": {"type": "path", "range": [0, 1]}})
 
 
 def test_a_table_that_is_too_steep_is_refused():

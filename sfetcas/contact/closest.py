@@ -1,4 +1,4 @@
-"""Where members are nearest to each other: local minima of the distance between their centre lines.
+"""Where members are nearest to each other and to obstacles: local minima of the distance from their centre lines.
 
 Each member is sampled as a chain of straight pieces.  A tree of their middles gives the pairs of pieces that may be
 near, so that the effort grows with the number of members and of what is near, not with that of all pairs.  From each
@@ -17,12 +17,13 @@ from typing import Any
 import numpy as np
 
 from ..description.contacts import contact_radius, pairs_of
-from ..description.obstacles import members_of
+from ..description.obstacles import Obstacle, members_of, takes_part
 from ..description.scene import Scene
 from ..mathematics.arrays import TINY, Array, Index
 from ..mechanics.fields import Fields
+from ..mechanics.mesh import ContactPoint
 
-__all__ = ["Closest", "Near", "Pair", "answers"]
+__all__ = ["Closest", "Near", "Pair", "PairKey", "answers"]
 
 PIECES = 4
 """Straight pieces of an element at least."""
@@ -52,66 +53,116 @@ NEXT_TO = 0.95
 """Part of half a turn of the smallest circle within which places along members are not near to each other."""
 
 
+NARROW = 1e-3
+"""Share of the length of a member over which minima of its distance from an obstacle are one."""
+
+PairKey = tuple[str, tuple[str, ...]]
+"""Name of a contact, and the members that touch each other, or the one that touches its obstacle."""
+
+
 @dataclass(frozen=True)
 class Near:
-    """A local minimum of the distance between two members.
+    """A local minimum of the distance between two members, or of a member from an obstacle.
 
     Attributes
     ----------
     contact : str
-    members : (str, str)
-    at : (float, float)
+    members : (str, str) or (str,)
+    at : tuple of float
         Fractions of their lengths.
     normal : ndarray (3,)
-        Unit vector from the second to the first centre line.
-    apart : float
-        Distance of the centre lines, m.
+        Unit vector from the second centre line, or the obstacle, to the first.
+    gap : float
+        Distance of the surfaces, m; below zero where they penetrate.
     distance : float
-        Sum of the radii, m.
+        As of :class:`~sfetcas.mechanics.mesh.ContactPoint`.
     """
 
     contact: str
-    members: tuple[str, str]
-    at: tuple[float, float]
+    members: tuple[str, ...]
+    at: tuple[float, ...]
     normal: Array
-    apart: float
+    gap: float
     distance: float
 
     @property
-    def gap(self) -> float:
-        """Distance of the surfaces, m; below zero where they penetrate."""
-        return self.apart - self.distance
+    def pair(self) -> PairKey:
+        """What it is a minimum of."""
+        return self.contact, self.members
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two members that may touch, or one that may touch itself, and the sum of their radii, m."""
+    """Two members that may touch, one that may touch itself, or one that may touch an obstacle.
+
+    Attributes
+    ----------
+    contact : str
+    members : (str, str) or (str,)
+    distance : float
+        As of :class:`~sfetcas.mechanics.mesh.ContactPoint`.
+    width : float
+        Length along the members within which minima are one, over ``SAME``, m.
+    stop : Obstacle or None
+    ends : (bool, bool)
+        Whether an obstacle can push the ends of the member.
+    """
 
     contact: str
-    members: tuple[str, str]
+    members: tuple[str, ...]
     distance: float
+    width: float
+    stop: Obstacle | None = None
+    ends: tuple[bool, bool] = (True, True)
+
+    @property
+    def key(self) -> PairKey:
+        """Its name."""
+        return self.contact, self.members
+
+    @property
+    def normal(self) -> tuple[float, float, float] | None:
+        """The direction along which the distance is always measured; None where that is another one at each place."""
+        if self.stop is None or self.stop.kind != "flat":
+            return None
+        x, y, z = self.stop.normal.tolist()
+        return x, y, z
 
 
 class Closest:
-    """The search for what is near among the members of a scene that may touch each other."""
+    """The search for what is near among the members and obstacles of a scene."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.pairs: list[Pair] = []
+        pairs: list[Pair] = []
         for name, contact in scene.contacts.items():
+            names = [m for m in members_of(contact, scene.members) if scene.members[m].type != "small"]
             if contact.between_members:
-                names = [m for m in members_of(contact, scene.members) if scene.members[m].type != "small"]
                 radii = {m: contact_radius(contact, scene.members[m], scene.sections) or 0.0 for m in names}
                 for a, b in pairs_of(names, scene.members):
                     # Where they touch along a line places are those of the nodes of the first one.
                     a, b = (b, a) if scene.members[a].type == "rigid" else (a, b)
-                    self.pairs.append(Pair(name, (a, b), radii[a] + radii[b]))
-        self.members = sorted({member for pair in self.pairs for member in pair.members})
+                    pairs.append(Pair(name, (a, b), radii[a] + radii[b], radii[a] + radii[b]))
+            else:
+                pairs += [self._against(name, member) for member in names]
+        self.pairs = {pair.key: pair for pair in pairs}
+        self._between = [pair for pair in pairs if pair.stop is None]
+        self.members = sorted({member for pair in pairs for member in pair.members})
+        self._tree_members = sorted({member for pair in self._between for member in pair.members})
         self.lengths = {member: scene.center_lines[member].length for member in self.members}
-        self.least = {
-            member: 0.5 * min(pair.distance for pair in self.pairs if member in pair.members) for member in self.members
-        }
-        self.largest = max((pair.distance for pair in self.pairs), default=0.0)
+        self.least = dict.fromkeys(self.members, np.inf)
+        for pair in pairs:
+            size = 0.5 * pair.distance if pair.stop is None else pair.stop.radius or np.inf
+            self.least |= {member: min(self.least[member], size) for member in pair.members}
+        self.largest = max((pair.distance for pair in self._between), default=0.0)
+
+    def _against(self, name: str, member: str) -> Pair:
+        """A member and an obstacle."""
+        scene, stop = self.scene, self.scene.obstacles[name]
+        radius, nodes = scene.contacts[name].member_radius, scene.members[member].nodes
+        first, last = (takes_part(node, scene.nodes[node], scene.motions.values(), stop) for node in nodes)
+        width = max(radius, NARROW * scene.center_lines[member].length)
+        return Pair(name, (member,), radius + stop.sign * stop.radius, width, stop, (first, last))
 
     def samples(self, fields: Fields, member: str) -> Array:
         """Fractions (n,) of the length of a member between which it is nearly straight."""
@@ -124,16 +175,89 @@ class Closest:
 
     def found(self, fields: Fields, reach: float, pairs: Sequence[Pair] | None = None) -> list[Near]:
         """All minima, of given pairs or of all, at which surfaces are nearer to each other than ``reach``, m."""
-        pairs = self.pairs if pairs is None else pairs
+        pairs = list(self.pairs.values()) if pairs is None else pairs
         if not pairs:
             return []
         x = {member: self.samples(fields, member) for member in self.members}
-        points = {member: fields.positions(member, x[member]) for member in self.members}
-        near: list[Near] = []
-        longest = max(float(np.linalg.norm(np.diff(points[m], axis=0), axis=1).max()) for m in self.members)
-        for pair, at in self._candidates(points, x, reach, pairs, longest):
+        near = self._beside_obstacles(fields, x, reach, [pair for pair in pairs if pair.stop is not None])
+        between = [pair for pair in pairs if pair.stop is None]
+        if not between:
+            return near
+        points = {member: fields.positions(member, x[member]) for member in self._tree_members}
+        longest = max(float(np.linalg.norm(np.diff(p, axis=0), axis=1).max()) for p in points.values())
+        for pair, at in self._candidates(points, x, reach, between, longest):
             near += self._minima(fields, pair, at, reach, longest)
         return near
+
+    def gap(self, fields: Fields, pair: Pair) -> float | None:
+        """Smallest distance of the surfaces of a pair, m; None of members that are nowhere near to each other."""
+        if pair.stop is None:
+            return min((one.gap for one in self.found(fields, NEARBY * self.scene.size, [pair])), default=None)
+        ends = self._gaps(fields, pair, np.array([0.0, 1.0]))[0].tolist()
+        return min([*ends, *(one.gap for one in self.found(fields, np.inf, [pair]))])
+
+    # -- obstacles --------------------------------------------------------------------------------
+
+    def _beside_obstacles(self, fields: Fields, x: dict[str, Array], reach: float, pairs: Sequence[Pair]) -> list[Near]:
+        """The minima of the distance of members from obstacles; a node where several members end is one place."""
+        found, nodes = list[Near](), set[tuple[str, str]]()
+        for pair in pairs:
+            (member,) = pair.members
+            places = x[member]
+            gaps = self._gaps(fields, pair, places)[0]
+            padded = np.concatenate([[np.inf], gaps, [np.inf]])
+            # Of a member that lies along a plane rounding shall not make a minimum of each sample.
+            rounding = ALIKE * np.abs(gaps).max()
+            least = (gaps <= padded[:-2] - rounding) | (padded[:-2] == np.inf)
+            least &= gaps <= padded[2:] + rounding
+            least &= gaps < reach + self.lengths[member] * np.diff(places).max()
+            i = np.flatnonzero(least)
+            at = self._least(
+                fields, pair, places[np.maximum(i - 1, 0)], places[i], places[np.minimum(i + 1, len(places) - 1)]
+            )
+            gaps, normals, *_ = self._gaps(fields, pair, at)
+            for s, gap, normal in zip(at.tolist(), gaps.tolist(), normals, strict=True):
+                if gap >= reach:
+                    continue
+                if s in (0.0, 1.0):
+                    end = pair.contact, self.scene.members[member].nodes[int(s)]
+                    if not pair.ends[int(s)] or end in nodes:
+                        continue
+                    nodes.add(end)
+                found.append(Near(pair.contact, pair.members, (s,), normal, gap, pair.distance))
+        return found
+
+    def _least(self, fields: Fields, pair: Pair, low: Array, at: Array, high: Array) -> Array:
+        """Places (n,) of the minima between others."""
+        (member,) = pair.members
+        for _ in range(ITERATIONS):
+            _, _, slope, curvature = self._gaps(fields, pair, at)
+            low, high = np.where(slope < 0.0, at, low), np.where(slope > 0.0, at, high)
+            after = at - slope / (np.maximum(np.abs(curvature), TINY) * self.lengths[member])
+            outside = ((after <= low) & (low > 0.0)) | ((after >= high) & (high < 1.0))
+            after = np.clip(np.where(outside, 0.5 * (low + high), after), 0.0, 1.0)
+            moved, at = np.abs(after - at).max(initial=0.0), after
+            if moved < ARRIVED:
+                break
+        return at
+
+    def _gaps(self, fields: Fields, pair: Pair, x: Array) -> tuple[Array, Array, Array, Array]:
+        """Of places (n,) of the member gaps (n,), m, normals (n, 3), and slopes (n,) and curvatures (n,), 1/m, of the
+        gap by arc length.
+        """
+        (member,), stop = pair.members, pair.stop
+        assert stop is not None
+        tangent, bent = fields.tangents(member, x), self._curvature(fields, member, x)
+        out = (fields.positions(member, x) - stop.place) @ stop.across
+        normals = stop.normals(out + stop.place, tangent)
+        slope = np.einsum("ni,ni->n", normals, tangent)
+        curvature = np.einsum("ni,ni->n", normals, bent)
+        gaps = np.einsum("ni,ni->n", out, normals) - pair.distance
+        if stop.kind == "round":
+            along = np.einsum("ni,ni->n", tangent @ stop.across, tangent)
+            apart = np.maximum(np.linalg.norm(out, axis=1), TINY)
+            curvature += stop.sign * (along - slope**2) / apart
+        return gaps, normals, slope, curvature
 
     # -- pieces -----------------------------------------------------------------------------------
 
@@ -146,14 +270,14 @@ class Closest:
         """
         from scipy.spatial import cKDTree
 
-        middles = [0.5 * (points[member][1:] + points[member][:-1]) for member in self.members]
+        middles = [0.5 * (points[member][1:] + points[member][:-1]) for member in self._tree_members]
         starts = np.concatenate([[0], np.cumsum([len(part) for part in middles])])
         owners = np.repeat(np.arange(len(middles)), np.diff(starts))
         # A piece is at most half of it from its middle, and its arc rises above it by less than a quarter.
         limit = self.largest + reach + 1.5 * longest
         found = cKDTree(np.concatenate(middles)).query_pairs(limit, output_type="ndarray")
         one, other = owners[found[:, 0]], owners[found[:, 1]]
-        number = {member: k for k, member in enumerate(self.members)}
+        number = {member: k for k, member in enumerate(self._tree_members)}
         for pair in pairs:
             (a, b), (first, second) = (number[m] for m in pair.members), pair.members
             chosen = found[(np.minimum(one, other) == min(a, b)) & (np.maximum(one, other) == max(a, b))]
@@ -212,17 +336,25 @@ class Closest:
             if self._next_to(pair, at[0, [i]], at[1, [i]])[0]:
                 continue
             place = (float(at[0, i]), float(at[1, i]))
-            if any(self.alike(pair.members, place, other, pair.distance) for other in known):
+            if any(self.alike(pair.key, place, other) for other in known):
                 continue
             known.append(place)
-            yield Near(pair.contact, pair.members, place, normals[i], float(apart[i]), pair.distance)
+            yield Near(pair.contact, pair.members, place, normals[i], float(apart[i]) - pair.distance, pair.distance)
 
     def beside(self, fields: Fields, pair: Pair, stations: Array, reach: float) -> list[Near]:
-        """Of places (n,) of the first member of a pair those at which the second one is nearer than ``reach``, m.
+        """Of places (n,) of the first member of a pair those at which the second one, or the obstacle, is nearer than
+        ``reach``, m.
 
         Beyond the ends of the second one there are none.  Where a member is beside itself each place counts with those
         that come later on it.
         """
+        if pair.stop is not None:
+            gaps, normals, *_ = self._gaps(fields, pair, stations)
+            held = np.array([x in (0.0, 1.0) and not pair.ends[int(x)] for x in stations.tolist()])
+            return [
+                Near(pair.contact, pair.members, (float(stations[i]),), normals[i], float(gaps[i]), pair.distance)
+                for i in np.flatnonzero((gaps < reach) & ~held).tolist()
+            ]
         first, second = pair.members
         x = self.samples(fields, second)
         here, points = fields.positions(first, stations), fields.positions(second, x)
@@ -254,23 +386,21 @@ class Closest:
         if first == second:
             chosen &= at[0] < at[1]
         return [
-            Near(pair.contact, pair.members, (float(s), float(t)), n, float(a), pair.distance)
+            Near(pair.contact, pair.members, (float(s), float(t)), n, float(a) - pair.distance, pair.distance)
             for s, t, n, a in zip(at[0][chosen], at[1][chosen], normals[chosen], apart[chosen], strict=True)
         ]
 
-    def alike(
-        self, members: tuple[str, str], one: tuple[float, float], other: tuple[float, float], distance: float
-    ) -> bool:
-        """Whether two places on a pair of members are as good as one."""
-        along = (abs(p - r) * self.lengths[m] for p, r, m in zip(one, other, members, strict=True))
-        return max(along) < SAME * distance
+    def alike(self, pair: PairKey, one: tuple[float, ...], other: tuple[float, ...], share: float = 1.0) -> bool:
+        """Whether two places of a pair are as good as one, or so near as a share of that."""
+        along = (abs(p - r) * self.lengths[m] for p, r, m in zip(one, other, pair[1], strict=True))
+        return max(along) < SAME * share * self.pairs[pair].width
 
-    def shape(
-        self, fields: Fields, contact: str, members: tuple[str, str], at: tuple[float, float]
-    ) -> tuple[Array, float]:
-        """Slopes (2,) of the distance by both arc lengths at a place, and its least curvature times the distance."""
-        slope, curvature, apart, _ = self._distance(fields, Pair(contact, members, 0.0), np.array(at)[:, None])
-        return slope[:, 0], float(np.linalg.eigvalsh(curvature[:, :, 0])[0] * apart[0])
+    def slopes(self, fields: Fields, key: PairKey, at: tuple[float, ...]) -> Array:
+        """Slopes (2,) or (1,) of the distance by the arc lengths at a place."""
+        pair = self.pairs[key]
+        if pair.stop is not None:
+            return self._gaps(fields, pair, np.array(at))[2]
+        return self._distance(fields, pair, np.array(at)[:, None])[0][:, 0]
 
     def _distance(self, fields: Fields, pair: Pair, at: Array) -> tuple[Array, Array, Array, Array]:
         """Slope (2, n) and curvature (2, 2, n) of the distance by both arc lengths, distance (n,), normals (n, 3)."""
@@ -360,36 +490,65 @@ def _closest_on_pieces(p: Array, p_end: Array, r: Array, r_end: Array) -> tuple[
 
 
 def answers(fields: Fields) -> dict[str, dict[str, Any]]:
-    """For each contact between members the ``force`` (3,) N on the first one, ``at``, ``gap`` in m, ``member``, and of
-    the second one ``other`` and ``other_at``; lists where members touch at several places.
+    """For each contact the ``force`` (3,) N on the member, ``at``, ``gap`` in m, and ``member``; between members of the
+    second one ``other`` and ``other_at``; lists where they touch at several places.
     """
-    closest, found = Closest(fields.model.scene), dict[str, dict[str, Any]]()
-    for name in dict.fromkeys(pair.contact for pair in closest.pairs):
+    scene, found = fields.model.scene, dict[str, dict[str, Any]]()
+    closest = Closest(scene)
+    for name, contact in scene.contacts.items():
         points = sorted((p for p in fields.model.mesh.points if p.contact == name), key=lambda p: (p.members, p.at))
+        further = ("other", "other_at") if contact.between_members else ()
         if not points:
-            pairs = [pair for pair in closest.pairs if pair.contact == name]
-            near = closest.found(fields, NEARBY * fields.model.scene.size, pairs)
-            gap = min((one.gap for one in near), default=None)
-            found[name] = {
-                "force": np.zeros(3),
-                "at": None,
-                "gap": gap,
-                "member": None,
-                "other": None,
-                "other_at": None,
-            }
+            pairs = [pair for pair in closest.pairs.values() if pair.contact == name]
+            gap = min((gap for pair in pairs if (gap := closest.gap(fields, pair)) is not None), default=None)
+            found[name] = {"force": np.zeros(3), "at": None, "gap": gap, "member": None, **dict.fromkeys(further)}
             continue
-        entries = []
-        for point in points:
-            told = fields.contact_point(point)
-            (first, second), (s, t) = point.members, told["at"]
-            apart = fields.positions(first, np.array([s]))[0] - fields.positions(second, np.array([t]))[0]
-            gap = float(np.linalg.norm(apart)) - point.distance
-            place = {"force": told["force"], "at": s, "gap": gap, "member": first}
-            entries.append({**place, "other": second, "other_at": t})
+        entries = [_entry(fields, point) for point in points]
+        if not contact.between_members:
+            entries = _stretches(fields, entries)
         found[name] = entries[0] if len(entries) == 1 else {key: [e[key] for e in entries] for key in entries[0]}
+    return found
+
+
+def _entry(fields: Fields, point: ContactPoint) -> dict[str, Any]:
+    """What is told of one point."""
+    told = fields.contact_point(point)
+    places = [fields.positions(m, np.array([x]))[0] for m, x in zip(point.members, told["at"], strict=True)]
+    entry = {"force": told["force"], "at": told["at"][0], "member": point.members[0]}
+    if len(places) == 2:
+        gap = float(np.linalg.norm(places[0] - places[1])) - point.distance
+        return {**entry, "gap": gap, "other": point.members[1], "other_at": told["at"][1]}
+    stop = fields.model.scene.obstacles[point.contact]
+    gap = stop.gaps(places[0][None], fields.tangents(point.members[0], np.array(told["at"])))[0]
+    return {**entry, "gap": float(gap) - fields.model.scene.contacts[point.contact].member_radius}
+
+
+def _stretches(fields: Fields, entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Entries on an obstacle, those at ends of elements that follow each other as one along a stretch."""
+    found: list[dict[str, Any]] = []
+    last = None
+    for entry in entries:
+        cuts = fields.model.mesh.cuts[entry["member"]]
+        number = int(np.argmin(np.abs(cuts - entry["at"])))
+        here = (entry["member"], number) if abs(cuts[number] - entry["at"]) < CUT else None
+        if here is not None and last == (entry["member"], number - 1):
+            before = found[-1]
+            begin = np.atleast_1d(before["at"])[0]
+            gap = max(before["gap"], entry["gap"], key=abs)
+            found[-1] = {
+                **before,
+                "force": before["force"] + entry["force"],
+                "at": [float(begin), entry["at"]],
+                "gap": gap,
+            }
+        else:
+            found.append(entry)
+        last = here
     return found
 
 
 NEARBY = 1.0
 """Distance up to which the gap of members that do not touch is told, in sizes of the scene."""
+
+CUT = 1e-12
+"""Fraction of a length within which a place is at an end of elements."""

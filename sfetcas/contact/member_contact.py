@@ -26,10 +26,11 @@ from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import ContactPoint, Mesh
 from ..mechanics.model import Model
+from ..mechanics.segments import place_of_cut, standing
 from ..solvers.continuation import JUMPED, near_factor
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
-from .closest import Closest, Near, Pair
+from .closest import Closest, Near, Pair, PairKey
 
 __all__ = ["MemberContact"]
 
@@ -69,6 +70,9 @@ ROUGH, REFINED = 0.05, 8
 unstable on a coarse mesh may be stable; divisions at one state at most.
 """
 
+HALVED, BESIDE = 3, 2
+"""Times that elements are halved once more, and how many on either side, beside the end of a line."""
+
 NUDGE = 0.02
 """Rotation, rad, by which an unstable state is moved along its unstable mode."""
 
@@ -107,6 +111,8 @@ class MemberContact:
     closest : Closest
     tolerance : float
         Penetration that is accepted, m.
+    redundant : bool or None
+        Whether rows of the scene without contact are redundant; None where that is not known.
     lines : set
         Contacts and pairs of members that touch along lines, at nodes of the first one.
     """
@@ -116,11 +122,12 @@ class MemberContact:
     ) -> None:
         self.scene, self.prepare, self.fixed = scene, prepare, fixed
         self.closest = Closest(scene)
-        radii = min((pair.distance for pair in self.closest.pairs), default=np.inf)
+        radii = min((pair.distance for pair in self.closest.pairs.values() if pair.stop is None), default=np.inf)
         self.tolerance = min(max(0.1 * accuracy, tolerances.CLOSED) * scene.size, ALLOWED * radii)
         self.leaves = scene.analysis.unstable == "leave"
         self.jumps: list[float] = []
-        self.lines: set[tuple[str, tuple[str, str]]] = set()
+        self.redundant: bool | None = None
+        self.lines: set[PairKey] = set()
 
     # -- begin ------------------------------------------------------------------------------------
 
@@ -132,7 +139,8 @@ class MemberContact:
         SceneError
             Names them, where and how deep.
         """
-        deep = [near for near in self.closest.found(fields, 0.0) if near.gap < -max(self.tolerance, 1e-9 * near.apart)]
+        between = [pair for pair in self.closest.pairs.values() if pair.stop is None]
+        deep = [near for near in self.closest.found(fields, 0.0, between) if near.gap < -self.tolerance]
         if not deep:
             return
         near = min(deep, key=lambda one: one.gap)
@@ -154,6 +162,32 @@ class MemberContact:
         """Whether members neither penetrate nor pass each other from one state to another."""
         return self.clear(after.fields) and not self.passed(before.fields, after.fields)
 
+    def lying(self, start: Solved) -> Solved:
+        """An undeformed state with the points where members lie on obstacles."""
+        fields, close = start.fields, tolerances.CLOSED * self.scene.size
+        on = [pair for pair in self.closest.pairs.values() if pair.stop is not None]
+        found = {(near.pair, near.at): near for near in self.closest.found(fields, close, on)}
+        for pair in on:
+            (member,) = pair.members
+            along = self.closest.beside(fields, pair, start.model.mesh.cuts[member], close)
+            if len(along) >= LINE and self._flexible(member):
+                self.lines.add(pair.key)
+                found = {key: near for key, near in found.items() if near.pair != pair.key}
+            elif self._flexible(member):
+                continue
+            found |= {(near.pair, near.at): near for near in along}
+        if not found:
+            return start
+        points = tuple(replace(_begun(near), number=i) for i, near in enumerate(found.values()))
+        prepared = self.prepare(replace(start.model.mesh, points=points))
+        nothing = prepared.model.loading(0.0, 0.0)
+        state = self._carried(start, prepared)
+        return Solved(prepared, state, nothing, prepared.equations.at(state, nothing), 0.0)
+
+    def _flexible(self, member: str) -> bool:
+        """Whether elements of a member may be divided where it touches."""
+        return self.scene.members[member].type != "rigid" and member not in self.fixed
+
     # -- one loading ------------------------------------------------------------------------------
 
     def solved(
@@ -167,6 +201,8 @@ class MemberContact:
         prepared = self.prepare(replace(mesh, points=points))
         loading = way(prepared.model)
         state = self._carried(source, prepared)
+        # Seen without contact, whose rows depend on others only nearly, where places are beside each other.
+        prepared.equations.redundant = self.redundant
         resisting = None
         if since is not None:
             resisting = Drag(prepared.equations, transferred(since.model, since.state, prepared.model), drag)
@@ -188,34 +224,44 @@ class MemberContact:
         lam[others] = state.lam[others]
         rows = {name: i for i, name in reversed(list(enumerate(target.row_names)))}
         unit, axes = target.scales.length, target.element.axes
+        # Those that continue are where the points of the state are now.
+        now = zip(self.points(source), before.mesh.points, strict=True)
+        formers = {(p.pair, tuple(round(x, 9) for x in p.at)): former for p, former in now}
         for point in target.mesh.points:
-            first, second = (
-                source.fields.positions(m, np.array([at]))[0] for m, at in zip(point.members, point.at, strict=True)
-            )
-            change = ((first - second)[:axes] - undeformed_distance(self.scene, point)[:axes]) / unit
+            change = (self._vector(source.fields, point)[:axes] - undeformed_distance(self.scene, point)[:axes]) / unit
             for k in range(axes):
                 y[numbers[f"{point.between}, {'xyz'[k]}"]] = change[k]
-            for side in (0, 1):
-                if point.slides[side]:
+            for side, free in enumerate(point.slides):
+                if free:
                     y[numbers[f"{point.place(side)}, arc length"]] = 0.0
-            former = self._former(before, source, point)
-            if former is not None:
+                else:
+                    self._placed(y, numbers, source.fields, target, point, side)
+            former = formers.get((point.pair, tuple(round(x, 9) for x in point.at)))
+            if former is not None and not point.new:
                 for one, other in zip(former.rows(axes), point.rows(axes), strict=True):
                     lam[rows[other]] = source.state.lam[known[one]]
         return replace(state, y=y, lam=lam)
 
     @staticmethod
-    def _former(before: Model, source: Solved, point: ContactPoint) -> ContactPoint | None:
-        """The point of a state that a point continues; None for a new one."""
-        if point.normal is not None:
-            return None
-        for other in before.mesh.points:
-            at = source.fields.contact_point(other)["at"]
-            if (other.contact, other.members) == (point.contact, point.members) and np.allclose(
-                at, point.at, rtol=0.0, atol=1e-9
-            ):
-                return other
-        return None
+    def _placed(
+        y: Array, numbers: dict[str, int], fields: Fields, target: Model, point: ContactPoint, side: int
+    ) -> None:
+        """Enter how far the end of elements has moved where a point stays, into displacements (n,) by their numbers."""
+        member, cut = point.members[side], standing(target.mesh, point, side)
+        if cut is None:
+            return
+        x = target.mesh.cuts[member][[cut]]
+        place = place_of_cut(target.mesh, target.segments.ends, member, cut)
+        moved = fields.positions(member, x)[0] - target.scene.center_lines[member].positions(x)[0]
+        for k, axis in enumerate("xyz"[: target.element.axes]):
+            number = numbers.get(f"{place}.{axis}")
+            if number is not None:
+                y[number] = moved[k] / target.scales.length
+
+    def _vector(self, fields: Fields, one: ContactPoint | Near) -> Array:
+        """The vector (3,) from the second centre line, or the obstacle, to the first, m."""
+        places = [fields.positions(m, np.array([at]))[0] for m, at in zip(one.members, one.at, strict=True)]
+        return np.asarray(places[0] - (places[1] if len(places) == 2 else self.scene.obstacles[one.contact].place))
 
     def resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float = 0.0) -> Solved | None:
         """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found."""
@@ -242,10 +288,13 @@ class MemberContact:
         now = [replace(point, at=entry["at"]) for point, entry in zip(points, told, strict=True)]
         pushes = np.array([entry["push"] for entry in told])
         lost = np.array([self._lost(fields, point) for point in now], dtype=bool)
-        wrong = lost | (pushes < -LASTING * np.abs(pushes).max(initial=0.0) - 1e-12 * found.model.scales.force)
+        rounding = LASTING * np.abs(pushes).max(initial=0.0)
+        # Along a line what does not push is left; what slides there may have to stay until it is known.
+        wrong = lost | (pushes < -rounding - 1e-12 * found.model.scales.force)
+        wrong |= np.array([self._of_line(point) for point in now], dtype=bool) & (pushes < rounding)
         kept = [point for point, off in zip(now, wrong, strict=True) if not off]
         more = self._penetrating(fields, kept)
-        key = frozenset((p.contact, p.members, round(p.at[0], 9)) for p in (*kept, *more))
+        key = frozenset((p.pair, round(p.at[0], 9)) for p in (*kept, *more))
         if key in tried and (wrong.any() or more):
             # All at once is faster; where that goes round, one after the other.
             worst = int(np.argmin(pushes)) if wrong.any() else -1
@@ -262,7 +311,7 @@ class MemberContact:
         """Whether a point is where members are not nearest: where it does not push, nothing else keeps it there."""
         if not any(point.slides) or not all(0.0 <= x <= 1.0 for x in point.at):
             return False
-        slopes, _ = self.closest.shape(fields, point.contact, point.members, point.at)
+        slopes = self.closest.slopes(fields, point.pair, point.at)
         return bool(np.abs(slopes[list(point.slides)]).max() > NEAREST)
 
     def _merged(self, points: list[ContactPoint], pushes: Array) -> list[ContactPoint]:
@@ -275,30 +324,29 @@ class MemberContact:
         return [point for point in points if point in kept]
 
     def _same(self, point: ContactPoint | Near, other: ContactPoint, share: float = 0.2) -> bool:
-        if (point.contact, point.members) != (other.contact, other.members):
-            return False
-        return self.closest.alike(point.members, point.at, other.at, share * other.distance)
+        return point.pair == other.pair and self.closest.alike(point.pair, point.at, other.at, share)
 
     def _freed(self, fields: Fields, point: ContactPoint) -> ContactPoint:
         """A point as it slides from where it is, though not beyond ends; along a line it stays on the first member."""
-        at = (min(max(point.at[0], 0.0), 1.0), min(max(point.at[1], 0.0), 1.0))
+        normal = self.closest.pairs[point.pair].normal
+        at = tuple(min(max(x, 0.0), 1.0) for x in point.at)
         if at != point.at:
-            slides = (point.slides[0] and at[0] == point.at[0], point.slides[1] and at[1] == point.at[1])
-            return replace(point, at=at, slides=slides, normal=None)
+            slides = tuple(free and x == now for free, x, now in zip(point.slides, at, point.at, strict=True))
+            return replace(point, at=at, slides=slides, normal=normal, new=False)
         free = [0.0 < x < 1.0 for x in at]
         if not all(free):
-            slopes, _ = self.closest.shape(fields, point.contact, point.members, at)
+            slopes = self.closest.slopes(fields, point.pair, at)
             # At an end a point goes inwards where that is nearer.
             free = [0.0 < x < 1.0 or (0.5 - x) * slope < 0.0 for x, slope in zip(at, slopes, strict=True)]
-        slides = (free[0] and not self._of_line(point), free[1])
-        return point if point.normal is None and slides == point.slides else replace(point, slides=slides, normal=None)
+        slides = (free[0] and not self._of_line(point), *free[1:])
+        same = not point.new and slides == point.slides
+        return point if same else replace(point, slides=slides, normal=normal, new=False)
 
     def _penetrating(self, fields: Fields, points: list[ContactPoint]) -> Points:
         """New points where members penetrate each other, the deepest first."""
         found: list[Near] = []
-        for pair in self.closest.pairs:
-            if (pair.contact, pair.members) in self.lines:
-                found += self._deepest(fields, pair, points)
+        for key in self.lines:
+            found += self._deepest(fields, self.closest.pairs[key], points)
         for one in self.closest.found(fields, 0.0):
             deep = one.gap < -self.tolerance and not self._of_line(one)
             if deep and not any(self._same(one, point) for point in points if not self._of_line(point)):
@@ -307,32 +355,32 @@ class MemberContact:
 
     def _of_line(self, one: ContactPoint | Near) -> bool:
         """Whether a place is one of those along a line: not where the second member ends, which slides on the first."""
-        return (one.contact, one.members) in self.lines and 0.0 < one.at[1] < 1.0
+        return one.pair in self.lines and _beside_ends(one)
 
     def _deepest(self, fields: Fields, pair: Pair, points: list[ContactPoint]) -> list[Near]:
         """Of ends of elements that penetrate those that do so more than the ones beside them: one by one of a line."""
         cuts = fields.model.mesh.cuts[pair.members[0]]
-        known = {p.at[0] for p in points if (p.contact, p.members) == (pair.contact, pair.members)}
+        known = {p.at[0] for p in points if p.pair == pair.key}
         near = {one.at[0]: one for one in self.closest.beside(fields, pair, cuts, 0.0) if one.at[0] not in known}
         gaps = np.array([near[x].gap if x in near else 0.0 for x in cuts.tolist()])
         padded = np.concatenate([[0.0], gaps, [0.0]])
-        deep = (gaps <= padded[:-2]) & (gaps <= padded[2:]) & (gaps < -tolerances.DECIMAL * pair.distance)
+        deep = (gaps <= padded[:-2]) & (gaps <= padded[2:]) & (gaps < -tolerances.DECIMAL * pair.width)
         return [near[x] for x in cuts[deep].tolist()]
 
     def _with_lines(self, found: Solved) -> tuple[Mesh, Points] | None:
         """Mesh and points where a pair that touches at many places is taken for a line from now on; None for none."""
         points, mesh = self.points(found), replace(found.model.mesh, points=())
-        for pair in self.closest.pairs:
-            key, first = (pair.contact, pair.members), pair.members[0]
-            own = [p for p in points if (p.contact, p.members) == key and 0.0 < p.at[1] < 1.0]
-            if self.scene.members[first].type == "rigid" or first in self.fixed:
+        for key, pair in self.closest.pairs.items():
+            first = pair.members[0]
+            own = [p for p in points if p.pair == key and _beside_ends(p)]
+            if not self._flexible(first):
                 continue
             if len(own) < LINE if key not in self.lines else not any(point.slides[0] for point in own):
                 continue
             self.lines.add(key)
             places = [point.at[0] for point in own]
             length = self.scene.center_lines[first].length
-            longest = max((max(places) - min(places)) / SHORT, 0.5 * pair.distance / length)
+            longest = max((max(places) - min(places)) / SHORT, 0.5 * pair.width / length)
             low, high = min(places) - longest, max(places) + longest
             while True:
                 cuts = mesh.cuts[first]
@@ -341,7 +389,7 @@ class MemberContact:
                     break
                 marks = {name: np.zeros(len(c) - 1, bool) for name, c in mesh.cuts.items()}
                 mesh = mesh.refined(marks | {first: long})
-            near = self.closest.beside(found.fields, pair, mesh.cuts[first], 0.1 * pair.distance)
+            near = self.closest.beside(found.fields, pair, mesh.cuts[first], 0.1 * pair.width)
             inside = [one for one in near if low <= one.at[0] <= high]
             others = tuple(point for point in points if point not in own)
             return mesh, (*others, *map(_begun, inside))
@@ -365,10 +413,12 @@ class MemberContact:
             moved = max(moved, float(np.linalg.norm(apart, axis=1).max()))
         return [near for near in self.closest.found(before, 2.0 * moved) if self._crossed(near, after)]
 
-    @staticmethod
-    def _crossed(near: Near, fields: Fields) -> bool:
-        first, second = (fields.positions(m, np.array([x]))[0] for m, x in zip(near.members, near.at, strict=True))
-        return bool(near.normal @ (first - second) <= 0.0)
+    def _crossed(self, near: Near, fields: Fields) -> bool:
+        stop = self.closest.pairs[near.pair].stop
+        if stop is not None and (stop.kind == "flat" or stop.sign < 0.0):
+            # What is on the wrong side of these is inside of them, and is pushed out again.
+            return False
+        return bool(near.normal @ self._vector(fields, near) <= 0.0)
 
     def turned(self, before: Fields, after: Fields) -> float:
         """Largest angle between tangents of the same place in two states, rad."""
@@ -436,6 +486,46 @@ class MemberContact:
             found = finer
         return found
 
+    def refined(self, found: Solved) -> Mesh:
+        """The mesh of a state with all elements halved, and several times those beside which members cease to touch.
+
+        Where they touch along a line the force by length ends there with a jump or a force at a point.
+        """
+        model = found.model
+        mesh = replace(model.mesh.refined(None, found.fields.kinks), points=())
+        for (_, (first, *_)), stretches in self._stretches(found).items():
+            for at in (x for stretch in stretches for x in (stretch[0], stretch[-1]) if 0.0 < x < 1.0):
+                for _ in range(HALVED):
+                    marks = {name: np.zeros(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
+                    cut = mesh.cut_at(first, at)
+                    marks[first][max(cut - BESIDE, 0) : cut + BESIDE] = True
+                    mesh = mesh.refined(marks)
+        return mesh
+
+    def _stretches(self, found: Solved) -> dict[PairKey, list[list[float]]]:
+        """Of each line the ends of elements that touch, those together that follow each other: fractions, rising."""
+        stretches: dict[PairKey, list[list[float]]] = {}
+        for key in (key for key in self.lines if self._flexible(key[1][0])):
+            cuts, last = found.model.mesh.cuts[key[1][0]], -2
+            for at in sorted(point.at[0] for point in self.points(found) if point.pair == key and self._of_line(point)):
+                number = int(np.argmin(np.abs(cuts - at)))
+                if number != last + 1:
+                    stretches.setdefault(key, []).append([])
+                stretches[key][-1].append(at)
+                last = number
+        return stretches
+
+    def points_on(self, mesh: Mesh, found: Solved) -> Points:
+        """The points of a state on a finer mesh, with those of lines at new ends of elements between old ones."""
+        points = self.points(found)
+        for key, stretches in self._stretches(found).items():
+            known = {at for stretch in stretches for at in stretch}
+            cuts = mesh.cuts[key[1][0]]
+            between = [x for x in cuts.tolist() if any(s[0] < x < s[-1] for s in stretches) and x not in known]
+            near = self.closest.beside(found.fields, self.closest.pairs[key], np.array(between), np.inf)
+            points = (*points, *map(_begun, near))
+        return points
+
     @staticmethod
     def points(found: Solved) -> Points:
         """The points of a state, where they are now."""
@@ -489,7 +579,13 @@ class MemberContact:
         return tuple(f"jumped {near_factor(begin + part * (end - begin))}: {JUMPED}" for part in self.jumps)
 
 
+def _beside_ends(one: ContactPoint | Near) -> bool:
+    """Whether a place is not where the second member ends."""
+    return all(0.0 < x < 1.0 for x in one.at[1:])
+
+
 def _begun(near: Near) -> ContactPoint:
-    """A point that begins where members are nearest to each other."""
-    normal = (float(near.normal[0]), float(near.normal[1]), float(near.normal[2]))
-    return ContactPoint(near.contact, near.members, near.at, (False, False), near.distance, normal=normal)
+    """A point that begins where surfaces are nearest to each other."""
+    x, y, z = near.normal.tolist()
+    still = (False,) * len(near.at)
+    return ContactPoint(near.contact, near.members, near.at, still, near.distance, normal=(x, y, z), new=True)

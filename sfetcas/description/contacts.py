@@ -20,10 +20,10 @@ __all__ = ["Contact", "contact_radius", "pairs_of"]
 _KEYS = {
     "point": ({"position", "side"}, set()),
     "line": ({"point", "direction", "side"}, set()),
-    "plane": ({"point", "normal"}, {"side"}),
-    "circle": ({"center", "radius"}, {"side"}),
-    "cylinder": ({"center", "radius"}, {"side", "axis"}),
-    "sphere": ({"center", "radius"}, {"side"}),
+    "plane": ({"point", "normal"}, {"side", "member_radius"}),
+    "circle": ({"center", "radius"}, {"side", "member_radius"}),
+    "cylinder": ({"center", "radius"}, {"side", "axis", "member_radius"}),
+    "sphere": ({"center", "radius"}, {"side", "member_radius"}),
     "members": (set(), {"radius"}),
 }
 """Of each type the keys that it needs, and those that it may have."""
@@ -38,6 +38,12 @@ def _side(value: Any) -> Any:
         if value not in ("inside", "outside"):
             raise ValueError(f"found {say(value)}, accepted: inside, outside, or a direction [x, y] or [x, y, z]")
         return value
+    return value
+
+
+def _not_below_zero(value: float) -> float:
+    if not value >= 0.0:
+        raise ValueError(f"found {value:g}, accepted: zero or above")
     return value
 
 
@@ -76,6 +82,8 @@ class Contact(Record):
     side : (3,), or text
         Where members are allowed: a direction that points there; of what is round ``"inside"`` or
         ``"outside"``.  Default: of what is round the outside.
+    member_radius : m
+        Radius of the surface of the members that an obstacle stops; by default their centre line touches it.
     restitution : 1
         Speed across the obstacle after an impact over that before, from 0 to 1; of motions alone.
     """
@@ -91,6 +99,7 @@ class Contact(Record):
     member: str | None = None
     members: Annotated[tuple[str, ...] | Literal["all"], BeforeValidator(_members)] | None = None
     side: Annotated[Direction | Literal["inside", "outside"], BeforeValidator(_side)] | None = None
+    member_radius: Annotated[float, BeforeValidator(number), AfterValidator(_not_below_zero)] = 0.0
     restitution: Annotated[float, BeforeValidator(number), AfterValidator(_share)] = 0.0
 
     @model_validator(mode="after")

@@ -182,8 +182,8 @@ def edge_slopes(edge: Obstacle, positions: Curve, tangents: Curve, x: Array) -> 
     return np.einsum("ni,ni->n", (positions(x) - edge.place) @ edge.across, tangents(x))
 
 
-def check_start(obstacle: Obstacle, positions: Curve, tangents: Curve, size: float) -> None:
-    """Refuse a member that is inside an obstacle in the undeformed scene.
+def check_start(obstacle: Obstacle, positions: Curve, tangents: Curve, size: float, radius: float = 0.0) -> None:
+    """Refuse a member of given radius, m, that is inside an obstacle in the undeformed scene.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def check_start(obstacle: Obstacle, positions: Curve, tangents: Curve, size: flo
             raise SceneError("passes along the key 'side', accepted: a direction across the member")
         gaps = np.sign(side) * np.einsum("ni,ni->n", positions(x) - obstacle.place, normals)
     else:
-        gaps = obstacle.gaps(positions(x), tangents(x))
+        gaps = obstacle.gaps(positions(x), tangents(x)) - radius
     deepest = int(np.argmin(gaps))
     if gaps[deepest] < -tolerances.CLOSED * size:
         raise SceneError(f"starts inside, by {-gaps[deepest]:.3g} m at the fraction {x[deepest]:.3g} of its length")

@@ -35,7 +35,7 @@ from .moving import (
     check_unilateral,
     check_velocities,
 )
-from .obstacles import check_start, members_of, obstacle
+from .obstacles import Obstacle, check_start, members_of, obstacle
 from .records import Named, Record, Vector, brief, counted, enumerated, number, say, unknown
 from .remembering import check_memory, refuse_memory, remembering_section
 from .rings import Ring, begins_at, check_ring
@@ -265,6 +265,13 @@ class Scene(Record):
         return MappingProxyType(lines)
 
     @cached_property
+    def obstacles(self) -> Mapping[str, Obstacle]:
+        """The obstacles that stop members, in numbers, by name."""
+        space = self.resolved_dimension == "space"
+        stops = {name: obstacle(one, space) for name, one in self.contacts.items() if not one.between_members}
+        return MappingProxyType(stops)
+
+    @cached_property
     def tendon_pieces(self) -> Mapping[str, tuple[Piece, ...]]:
         """The straight pieces and the stretches along members of the way of each tendon, by name."""
         ways = {name: pieces_of(t, self.nodes, self.members, self.center_lines) for name, t in self.tendons.items()}
@@ -297,6 +304,19 @@ class Scene(Record):
         """Whether springs have stops or tendons may be slack, so that it has to be found which of them act."""
         springs = any(spring.stop is not None for spring in self.springs.values())
         return springs or any(tendon.may_be_slack for tendon in self.tendons.values())
+
+    @property
+    def touches_at_points(self) -> bool:
+        """Whether it is an unknown where members touch, see :mod:`sfetcas.mechanics.contact_points`.
+
+        They touch each other, have a radius on obstacles, or laws that touches as conditions of elements do not know.
+        """
+        return any(
+            contact.between_members
+            or contact.member_radius > 0.0
+            or any(_of_points(self, contact, member) for member in members_of(contact, self.members))
+            for contact in self.contacts.values()
+        )
 
     @property
     def hits(self) -> bool:
@@ -978,34 +998,53 @@ def _check_contacts(scene: Scene) -> None:
                     f"found the {scene.members[member].type} member {member!r}, accepted: {accepted}",
                     ("contacts", name),
                 )
-            _check_stretching_contact(scene, name, member)
+            if _shears(scene, scene.members[member]):
+                raise SceneError(
+                    f"found the member {member!r}, which shears, accepted: {UNSHEARED}", ("contacts", name)
+                )
             off = scene.members[member].off_line(scene.sections)
             if off:
                 message = f"found the member {member!r}, whose section has {off}, accepted: members without touch"
                 raise SceneError(f"{message} obstacles", ("contacts", name))
-            law = scene.sections[str(scene.members[member].section)].law if scene.members[member].section else None
-            if law is not None:
-                message = f"found the member {member!r}, whose section has the law {law.type!r}"
-                raise SceneError(f"{message}, accepted: members without laws touch obstacles", ("contacts", name))
             line = scene.center_lines[member]
             try:
-                check_start(obstacle(contact, space), line.positions, line.tangents, scene.size)
+                check_start(scene.obstacles[name], line.positions, line.tangents, scene.size, contact.member_radius)
             except SceneError as error:
                 raise SceneError(f"member {member!r} {error}", ("contacts", name)) from None
+
+
+def _check_points(scene: Scene) -> None:
+    """Refuse what is not solved together with contact whose places are unknowns."""
+    if not scene.touches_at_points:
+        return
+    contacts = scene.contacts
+    name, what = next((name, why) for name in contacts if (why := _why_points(scene, name)))
+    where, found = ("contacts", name), f"found {what}"
+    if scene.analysis.type != "static":
+        message = f"{found} with analysis.type = {scene.analysis.type!r}"
+        raise SceneError(f"{message}, accepted: with 'static'", where)
+    edges = [other for other, stop in scene.obstacles.items() if stop.kind == "sharp"]
+    if edges:
+        message = f"{found} beside the edge {edges[0]!r}, accepted: planes, circles, cylinders and spheres"
+        raise SceneError(message, where)
+    if scene.stopped:
+        raise SceneError(f"{found} beside stops or tendons that may be slack, accepted: one of these", where)
+
+
+def _why_points(scene: Scene, name: str) -> str:
+    """What of a contact makes it an unknown where members touch; nothing where it does not."""
+    contact = scene.contacts[name]
+    if contact.between_members:
+        return "contact between members"
+    if contact.member_radius > 0.0:
+        return "a radius of members on an obstacle"
+    members = (m for m in members_of(contact, scene.members) if _of_points(scene, contact, m))
+    return next((f"an obstacle of {member!r}, which has a law or stretches" for member in members), "")
 
 
 def _check_between_members(scene: Scene, name: str) -> None:
     """Refuse contact between members whose surfaces are not known, or that no search is for."""
     contact, where = scene.contacts[name], ("contacts", name)
-    if scene.analysis.type != "static":
-        message = f"found contact between members with analysis.type = {scene.analysis.type!r}"
-        raise SceneError(f"{message}, accepted: with 'static'", where)
-    if any(not other.between_members for other in scene.contacts.values()):
-        message = "found contact between members beside obstacles, accepted: one of the two in a scene"
-        raise SceneError(message, where)
-    if scene.stopped:
-        message = "found contact between members beside stops or tendons that may be slack, accepted: one of these"
-        raise SceneError(message, where)
     names = members_of(contact, scene.members)
     if contact.members == "all":
         names = [member for member in names if scene.members[member].type != "small"]
@@ -1040,20 +1079,14 @@ UNSHEARED = "members that do not shear: a section without GA2, GA3 and shear"
 """What is accepted where members slide."""
 
 
-def _check_stretching_contact(scene: Scene, name: str, member: str) -> None:
-    """Refuse contact that is solved for members whose sections stay across their centre line, and keep its length."""
-    record, contact = scene.members[member], scene.contacts[name]
-    if not record.stretches(scene.sections):
-        return
-    if scene.sections[str(record.section)].stretch_law is not None:
-        found, accepted = "has a law of stretch", "members that stretch linearly, or not at all"
-    elif _shears(scene, record):
-        found, accepted = "shears", UNSHEARED
-    elif contact.radius is not None:
-        found, accepted = "stretches", f"obstacles that are not round, as this {contact.type} is, or no stretch"
-    else:
-        return
-    raise SceneError(f"found the member {member!r}, which {found}, accepted: {accepted}", ("contacts", name))
+def _of_points(scene: Scene, contact: Contact, member: str) -> bool:
+    """Whether a member has a law that is known where it touches an obstacle at points only."""
+    record = scene.members[member]
+    if record.section is None:
+        return False
+    section = scene.sections[record.section]
+    curved = record.stretches(scene.sections) and (contact.radius is not None or section.stretch_law is not None)
+    return curved or section.law is not None
 
 
 def _check_quantity(scene: Scene, quantity: str, at: float | None, *where: str) -> None:
@@ -1150,6 +1183,7 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_supports,
     _check_moving,
     _check_contacts,
+    _check_points,
     check_memory,
     check_insertion,
     _check_expect,

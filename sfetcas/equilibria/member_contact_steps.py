@@ -19,6 +19,7 @@ from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model
 from ..solvers.continuation import between
 from ..solvers.prepared import Prepared, Solved
+from ..solvers.redundancy import redundant
 from .force_balance import refuse_lost_forces
 from .meshing import Meshing
 from .refinement import LEVELS, MOST_ELEMENTS, Refinement
@@ -65,6 +66,7 @@ class MemberContactSteps:
         """
         zero = self._undeformed(pilot)
         if not self.checked:
+            self.run.redundant = redundant(pilot.equations, zero.point)
             self.run.refuse_penetrating(zero.fields)
             self.checked = True
         if self.last is None:
@@ -106,14 +108,14 @@ class MemberContactSteps:
 
     def _reached(self, pilot: Prepared, factor: float, zero: Solved) -> tuple[Solved, tuple[str, ...]]:
         """The state that the loads lead to, from the last factor where that lies on the way, and notes on it."""
-        begin, start, mesh = 0.0, zero, pilot.model.mesh
+        begin, start, mesh = 0.0, self.run.lying(zero), pilot.model.mesh
         if self.last is not None and self.last[0] * (factor - self.last[0]) >= 0.0:
             begin, start = self.last
             mesh = replace(start.model.mesh, points=())
         elif self.scene.histories:
-            found = self.run.follow(mesh, lambda t: lambda model: model.loading(0.0, t), zero)
+            found = self.run.follow(mesh, lambda t: lambda model: model.loading(0.0, t), start)
             start = self._known(found)
-        elif pilot.lacks_slack or pilot.diagnosis.mobility:
+        elif (pilot.lacks_slack or pilot.diagnosis.mobility) and start is zero:
             bent = self._begun(pilot, factor, zero)
             if bent is not None:
                 begin, start = bent.factor, bent
@@ -152,7 +154,7 @@ class MemberContactSteps:
                     break
                 now = self._onto(model.mesh.refined(marks, now.fields.kinks), now, factor)
                 continue
-            finer = self._onto(model.mesh.refined(None, now.fields.kinks), now, factor)
+            finer = self._onto(self.run.refined(now), now, factor)
             difference, error = self.meshes.judged(unjudged(now), unjudged(finer))
             if self.meshes.prescribed:
                 error += difference
@@ -185,7 +187,7 @@ class MemberContactSteps:
             It is not found there.
         """
         mesh, run = replace(mesh, points=()), self.run
-        there = run.resolved(mesh, run.points(found), found, lambda model: model.loading(factor))
+        there = run.resolved(mesh, run.points_on(mesh, found), found, lambda model: model.loading(factor))
         if there is None or run.turned(found.fields, there.fields) > NEAR:
             self.moved.add(factor)
             there = run.relaxed(mesh, found, lambda model: model.loading(factor))

@@ -315,8 +315,7 @@ class Configuration:
         scene = self.model.scene
         if not scene.contacts:
             return {}
-        found = closest.answers(self.fields) | touches.answers(self.fields)
-        return {name: found[name] for name in scene.contacts}
+        return closest.answers(self.fields) if scene.touches_at_points else touches.answers(self.fields)
 
     def pushes(self, contact: str) -> list[tuple[str, float, Array]]:
         """Where an obstacle pushes: member, fraction of its length, of a stretch its middle, and force (3,), N."""

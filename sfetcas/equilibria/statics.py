@@ -153,7 +153,7 @@ class LoadSteps:
         """The load steps of a scene with obstacles, or in which members touch each other."""
         if not self.scene.contacts:
             return None
-        if any(contact.between_members for contact in self.scene.contacts.values()):
+        if self.scene.touches_at_points:
             from .member_contact_steps import MemberContactSteps
 
             return MemberContactSteps(self.meshes, self.ways, self.refinement)

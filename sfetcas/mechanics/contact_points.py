@@ -1,4 +1,4 @@
-"""Points of contact between members as terms: where it is on both members are unknowns, the gap is a row.
+"""Points of contact as terms: where it is on the members are unknowns, the gap is a row.
 
 With the arc lengths ``s`` and ``t`` of a point on the first and the second member, the vector ``d`` between the centre
 lines is held by
@@ -9,6 +9,10 @@ and the multiplier of the second row is minus the contact force.  That the Lagra
 says that the force is normal to both members: there the distance is least.  The Lagrangian is largest in ``s`` and
 ``t``, not least: of all places it is the worst that must not penetrate.  Sums over elements as of
 :mod:`~sfetcas.mechanics.rings`.
+
+On an obstacle ``d`` begins at its place, a point of a plane, a centre or an axis ``a``, and its gap is
+
+    n . d - radius_1      or      |d - (a . d) a| - (radius_1 + radius),      inside of it with the opposite sign.
 
 Source: Konyukhov and Izadi 2015, Introduction to Computational Contact Mechanics, chapter 11 (contact of curves).
 """
@@ -27,6 +31,7 @@ from ..mathematics.arrays import Array, numbers
 from .mesh import ContactPoint
 from .parts import Parts
 from .rings import GuidedTerm, guided
+from .segments import place_of_cut, standing
 from .terms import GROUND, One, Side, Term
 
 __all__ = ["Apart", "Gap", "Meeting", "contact_points_in", "undeformed_distance"]
@@ -43,10 +48,17 @@ class Meeting(GuidedTerm):
 @final
 @dataclass(frozen=True)
 class Apart(Term):
-    """The share of the vector itself and of the first nodes of both members.
+    """The share of the vector itself, and of the first nodes of the members, or of the ends of elements where it stays.
 
-    Places: the vector, the two nodes, the places on both members.
+    Places: the vector, these, the places on the members.
+
+    Attributes
+    ----------
+    members : int
+        Two, or one on an obstacle.
     """
+
+    members: int = 2
 
     table: ClassVar[str] = "contacts"
     answers: ClassVar[Mapping[str, str]] = {
@@ -58,30 +70,38 @@ class Apart(Term):
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """Five places; no data."""
-        return 0, 5, self.axes, 0, 0
+        """The places; no data."""
+        return 0, 1 + 2 * self.members, self.axes, 0, 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """How far the vector has changed less what the starts of the members have moved."""
-        return [between - first + second for between, first, second in zip(*u[:3], strict=True)]
+        starts = [*u[1 : 1 + self.members], [ca.SX(0)] * self.axes][:2]
+        return [between - first + second for between, first, second in zip(u[0], *starts, strict=True)]
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
-        """How far the point has moved along both members, and the force (3,) on the first one."""
-        return [u[3][0], u[4][0], *ca.vertsplit(lam), *[ca.SX(0)] * (3 - self.axes)]
+        """How far the point has moved along the members, and the force (3,) on the first one."""
+        moved = [*(place[0] for place in u[1 + self.members :]), ca.SX(0)][:2]
+        return [*moved, *ca.vertsplit(lam), *[ca.SX(0)] * (3 - self.axes)]
 
 
 @final
 @dataclass(frozen=True)
 class Gap(Term):
-    """Constraint: the surfaces of two members touch; data: the vector where the search begins, sum of the radii.
+    """Constraint: surfaces touch; data: the vector where the search begins, and the distance.
 
     Attributes
     ----------
     directed : bool
         Whether the distance is measured along a given normal, whose components are data before the others.
+    across : bool
+        Whether it is measured across an axis, whose components are data before the others.
+    inside : bool
+        Whether it is that to something round which members are inside of: it and the distance count with a minus.
     """
 
     directed: bool
+    across: bool = False
+    inside: bool = False
 
     table: ClassVar[str] = "contacts"
     answers: ClassVar[Mapping[str, str]] = {"push": "N"}
@@ -89,39 +109,60 @@ class Gap(Term):
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """One place, one row."""
-        return 0, 1, 1, self.axes * (1 + self.directed) + 1, 0
+        return 0, 1, 1, self.axes * (1 + self.directed + self.across) + 1, 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """The gap."""
-        normal, begin, distance = ca.vertsplit(
-            data, [0, self.axes * self.directed, self.axes * (1 + self.directed), data.numel()]
-        )
-        between = begin + ca.vertcat(*u[0])
-        return [(ca.dot(normal, between) if self.directed else ca.norm_2(between)) - distance]
+        *ways, begin = ca.vertsplit(data[:-1], self.axes)
+        between, distance = begin + ca.vertcat(*u[0]), data[-1]
+        if self.directed:
+            return [ca.dot(ways[0], between) - distance]
+        if self.across:
+            between = between - ca.dot(ways[0], between) * ways[0]
+        return [(-1.0 if self.inside else 1.0) * ca.norm_2(between) - distance]
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
-        """The contact force, above zero where the members push each other."""
+        """The contact force, above zero where it is a push."""
         return [-lam[0]]
 
 
 def undeformed_distance(scene: Scene, point: ContactPoint) -> Array:
-    """Vector (3,) from the second to the first undeformed centre line where a point begins, m."""
+    """Vector (3,) from the second undeformed centre line, or the obstacle, to the first where a point begins, m."""
     lines = [scene.center_lines[member] for member in point.members]
-    first, second = (line.positions(np.array([at]))[0] for line, at in zip(lines, point.at, strict=True))
-    return np.asarray(first - second)
+    places = [line.positions(np.array([at]))[0] for line, at in zip(lines, point.at, strict=True)]
+    return np.asarray(places[0] - (places[1] if len(places) == 2 else scene.obstacles[point.contact].place))
 
 
 def contact_points_in(parts: Parts) -> Iterator[One]:
-    """Terms of the points where members touch each other."""
+    """Terms of the points where members touch each other or obstacles."""
     segments, unit, axes, space = parts.segments, parts.scales.length, parts.element.axes, parts.element.space
     for point in parts.mesh.points:
         between = segments.place(point.between)
-        slides = [segments.place(point.place(i)) if point.slides[i] else GROUND for i in (0, 1)]
-        starts = [segments.place(segments.ends[member, 0]) for member in point.members]
-        yield One(Apart(space), point.name, "", np.zeros(0), (), (between, *starts, *slides), point.name)
+        slides = [segments.place(point.place(i)) if free else GROUND for i, free in enumerate(point.slides)]
+        stands = [standing(parts.mesh, point, side) for side in range(len(point.members))]
+        starts = [
+            segments.place(place_of_cut(parts.mesh, segments.ends, member, cut or 0))
+            for member, cut in zip(point.members, stands, strict=True)
+        ]
+        apart = Apart(space, len(point.members))
+        yield One(apart, point.name, "", np.zeros(0), (), (between, *starts, *slides), point.name)
         for side, member in enumerate(point.members):
+            if stands[side] is not None:
+                continue
             yield from guided(parts, Meeting, (point.name,) * 2, (member, point.at[side]), slides[side], side == 1)
+        gap, ways = _gap(parts.scene, point, space)
         data = np.append(undeformed_distance(parts.scene, point)[:axes], point.distance) / unit
-        normal = np.zeros(0) if point.normal is None else np.array(point.normal)[:axes]
-        gap = Gap(space, point.normal is not None)
-        yield One(gap, point.name, "", numbers(np.concatenate([normal, data])), (), (between,), f"{point.name}, gap")
+        data = np.concatenate([*(way[:axes] for way in ways), data])
+        yield One(gap, point.name, "", numbers(data), (), (between,), f"{point.name}, gap")
+
+
+def _gap(scene: Scene, point: ContactPoint, space: bool) -> tuple[Gap, list[Array]]:
+    """The constraint of a point, and the directions that belong to its data."""
+    if point.normal is not None:
+        return Gap(space, True), [np.array(point.normal)]
+    if len(point.members) == 2:
+        return Gap(space, False), []
+    stop = scene.obstacles[point.contact]
+    axis = np.linalg.svd(stop.across)[2][2]
+    across = space and float(np.trace(stop.across)) < 2.5
+    return Gap(space, False, across, stop.sign < 0.0), [axis] if across else []

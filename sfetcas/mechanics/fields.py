@@ -152,25 +152,25 @@ class Fields:
         return {"at": at, "force": force, **found}
 
     def contact_point(self, point: ContactPoint) -> dict[str, Any]:
-        """Where members touch, ``at`` as fractions of the lengths of both, the ``force`` (3,) N on the first one, and
-        its size ``push`` N, below zero where they pull each other.
+        """Where members touch, ``at`` as fractions of their lengths, the ``force`` (3,) N on the first one, and its
+        size ``push`` N, below zero where it would be a pull.
         """
         found, lines = self.balance.answers("contacts", point.name), self.model.scene.center_lines
         moved = (found["moved on first"], found["moved on second"])
-        at = tuple(a + s / lines[m].length for a, s, m in zip(point.at, moved, point.members, strict=True))
+        at = tuple(a + s / lines[m].length for a, s, m in zip(point.at, moved, point.members, strict=False))
         force = np.array([found[f"force {axis}"] for axis in "xyz"])
         return {"at": at, "force": force, "push": found["push"]}
 
     @functools.cached_property
     def _pushed(self) -> dict[str, list[tuple[float, Array]]]:
-        """Where rings and other members push members, fraction of the length and force (3,) N, by member."""
+        """Where rings, other members and obstacles push members, fraction of the length and force (3,) N, by member."""
         found: dict[str, list[tuple[float, Array]]] = {}
         for name, ring in self.model.scene.rings.items():
             answer = self.ring(name)
             found.setdefault(ring.member, []).append((answer["at"], answer["force"]))
         for point in self.model.mesh.points:
             answer = self.contact_point(point)
-            for member, at, sign in zip(point.members, answer["at"], (1.0, -1.0), strict=True):
+            for member, at, sign in zip(point.members, answer["at"], (1.0, -1.0), strict=False):
                 found.setdefault(member, []).append((at, sign * answer["force"]))
         return found
 

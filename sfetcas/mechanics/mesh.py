@@ -76,41 +76,49 @@ class Touch:
 
 @dataclass(frozen=True)
 class ContactPoint:
-    """A place where two members touch, or a member touches itself.
+    """A place where two members touch, a member touches itself, or a member touches an obstacle.
 
-    Elements need not end there: where it is on both members are unknowns.
+    Elements need not end there: where it is on the members are unknowns.
 
     Attributes
     ----------
     contact : str
         Name of the record.
-    members : (str, str)
-        The first and the second member; the same one twice where it touches itself.
-    at : (float, float)
+    members : (str, str) or (str,)
+        The first and the second member, the same one twice where it touches itself; the one that touches an obstacle.
+    at : tuple of float
         Where the search for it begins, fractions of their lengths.
-    slides : (bool, bool)
+    slides : tuple of bool
         Whether its place on each member is an unknown; else it stays.
     distance : float
-        Between the two centre lines, m.
+        What the distance between the centre lines is, or from the plane, the centre or the axis of an obstacle to the
+        centre line, m; negative inside of what is round.
     number : int
         Distinguishes the points of one record.
     normal : (float, float, float), optional
-        Direction along which the distance is measured as long as it is not known how hard the members push, and where
-        they touch is not an unknown.
+        Direction along which the distance is measured: that of a plane; of what is new.
+    new : bool
+        Whether it is not yet known how hard it pushes: where it is is no unknown, and the normal is a given one.
     """
 
     contact: str
-    members: tuple[str, str]
-    at: tuple[float, float]
-    slides: tuple[bool, bool]
+    members: tuple[str, ...]
+    at: tuple[float, ...]
+    slides: tuple[bool, ...]
     distance: float
     number: int = 0
     normal: tuple[float, float, float] | None = None
+    new: bool = False
 
     @property
     def name(self) -> str:
         """Name of its rows, and of its places."""
         return f"contacts.{self.contact}, point {self.number + 1}"
+
+    @property
+    def pair(self) -> tuple[str, tuple[str, ...]]:
+        """The record and its members: what it is a point of."""
+        return self.contact, self.members
 
     def place(self, side: int) -> str:
         """Name of the place whose first displacement says how far it has moved along its first or second member."""
@@ -122,7 +130,7 @@ class ContactPoint:
 
     @property
     def between(self) -> str:
-        """Name of the place that is the vector from the second centre line to the first."""
+        """Name of the place that is the vector from the second centre line, or the obstacle, to the first."""
         return f"distance of {self.name}"
 
 
@@ -223,7 +231,7 @@ class Mesh:
     cushions : tuple of Cushion
         Penalty contacts, in the order of their members and fractions.
     points : tuple of ContactPoint
-        Where members touch each other.
+        Where members touch each other or obstacles, and it is an unknown where.
     places : bool
         Whether every end of an element of a flexible member has displacement unknowns, as masses need.
     spots : tuple of Spot, or None

@@ -19,7 +19,7 @@ from ..description.structure import SLIDING
 from ..description.tendons import Hole, Piece
 from ..mathematics import interpolation
 from ..mathematics.arrays import Array, Index
-from .mesh import Mesh
+from .mesh import ContactPoint, Mesh
 from .rotations import end_joints
 from .terms import GROUND
 
@@ -31,10 +31,12 @@ __all__ = [
     "cushioned",
     "cut_members",
     "elongation_of",
+    "place_of_cut",
     "place_of_ring",
     "place_within",
     "pulled_place",
     "spanned",
+    "standing",
     "tensions_of",
 ]
 
@@ -142,6 +144,23 @@ def _touched(mesh: Mesh, member: str) -> dict[int, str]:
     """Cuts of a member where obstacles push it, with the names of these places; its ends among them."""
     soft = {mesh.cut_at(member, c.at): cushioned(member, c.at) for c in mesh.cushions if c.member == member}
     return soft | {mesh.cut_at(member, touch.at): touch.name for touch in mesh.touches if touch.member == member}
+
+
+def standing(mesh: Mesh, point: ContactPoint, side: int) -> int | None:
+    """Number of the end of elements at which a point of contact stays on a member; None where it is within one."""
+    at, cuts = point.at[side], mesh.cuts[point.members[side]]
+    near = int(np.argmin(np.abs(cuts - at)))
+    return near if not point.slides[side] and abs(cuts[near] - at) < SAME_CUT else None
+
+
+SAME_CUT = 1e-13
+"""Fraction of a length within which a place is where elements end."""
+
+
+def place_of_cut(mesh: Mesh, ends: Mapping[tuple[str, int], str], member: str, cut: int) -> str:
+    """Name of the place where elements of a member end."""
+    last = len(mesh.cuts[member]) - 1
+    return ends[member, cut == last] if cut in (0, last) else place_within(member, mesh.cuts[member][cut])
 
 
 def place_within(member: str, at: float) -> str:
@@ -303,7 +322,9 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
         retained |= {ends[name, i] for i, cut in enumerate((0, last)) if cut in touched}
         every = name in stopped or (mesh.places and member.type == "flexible")
         inner = range(1, last) if every else _retained_cuts(scene, mesh, name)
-        stops = [0, *sorted({*inner, *touched} - {0, last}), last]
+        points = [(standing(mesh, p, i), m) for p in mesh.points for i, m in enumerate(p.members)]
+        pointed = {cut for cut, m in points if m == name and cut is not None}
+        stops = [0, *sorted({*inner, *touched, *pointed} - {0, last}), last]
         here = ends[name, 0]
         for a, b in zip(stops, stops[1:], strict=False):
             there = ends[name, 1] if b == len(cuts) - 1 else touched.get(b, place_within(name, cuts[b]))
@@ -322,7 +343,9 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     # Turning axes act upon all that has mass.
     retained |= set(scene.nodes) if scene.rotating is not None else set()
     retained |= {ends[ring.member, 0] for ring in scene.rings.values()}
-    retained |= {ends[member, 0] for point in mesh.points for member in point.members}
+    for point in mesh.points:
+        for side, touching in enumerate(point.members):
+            retained.add(place_of_cut(mesh, ends, touching, standing(mesh, point, side) or 0))
     retained |= set(_sprung(scene, mesh)) | {load.node for load in scene.loads.values() if load.follows and load.node}
     sizes = [part.elements.stop - part.elements.start for part in parts]
     owner = np.repeat(np.arange(len(parts)), sizes)
@@ -332,7 +355,7 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     strained |= twisted | {place_of_ring(name): {0: "arc length"} for name in scene.rings}
     axes = "xyz" if scene.resolved_dimension == "space" else "xy"
     for point in mesh.points:
-        strained |= {point.place(side): {0: "arc length"} for side in (0, 1) if point.slides[side]}
+        strained |= {point.place(side): {0: "arc length"} for side, free in enumerate(point.slides) if free}
         strained[point.between] = dict(enumerate(axes))
     return Segments(
         (*places, *strained),

@@ -1,0 +1,128 @@
+"""Contact with obstacles where it is an unknown where members touch: radii of members, laws, stretch, and with members.
+
+The independent route is contact as conditions of elements, by another code: what has the radius ``r`` on something is
+what has none on something that is larger by ``r``.
+"""
+
+import numpy as np
+import pytest
+
+from sfetcas import Scene, SceneError, solve
+
+LARGER = 0.1
+FAR = {"accuracy": 1e-7}
+
+FLOOR = {"type": "plane", "point": [0, -0.3], "normal": [0, 1]}
+DRUM = {"type": "circle", "center": [0.6, -0.5], "radius": 0.3}
+HOLE = {"type": "circle", "center": [0.5, 0.1], "radius": 0.65, "side": "inside"}
+
+
+def cantilever(contact, load=(0, -3), section=None, **more):
+    """A cantilever of unit length that is pressed on an obstacle by a force at its end."""
+    table = {
+        "sections": {"s": {"EI3": 1.0, **(section or {})}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"beam": {"nodes": ["A", "B"], "section": "s"}},
+        "loads": {"F": {"type": "force", "node": "B", "value": list(load)}},
+        "contacts": {"c": {**contact, "members": "all"}},
+        "analysis": FAR,
+    }
+    return Scene.from_dict(table | more)
+
+
+def smaller(contact):
+    """An obstacle that is farther away by the radius of the members."""
+    found = {**contact, "member_radius": LARGER}
+    if contact["type"] == "plane":
+        return found | {"point": [0, contact["point"][1] - LARGER]}
+    return found | {"radius": contact["radius"] + (LARGER if contact.get("side") == "inside" else -LARGER)}
+
+
+def force_of(step):
+    return np.reshape(step.contacts["c"]["force"], (-1, 3)).sum(axis=0)
+
+
+@pytest.mark.parametrize(
+    ("contact", "load"),
+    [(FLOOR, (0, -3)), (DRUM, (0, -3)), (DRUM, (0, -20)), (HOLE, (0, -4))],
+    ids=["plane", "drum", "wound around a drum", "inside"],
+)
+def test_radius_of_a_member_is_a_larger_obstacle(contact, load):
+    thin, thick = (solve(cantilever(c, load)).last for c in (contact, smaller(contact)))
+    # Both are accurate to 1e-7 of the length; forces are ten times the tip force at most.
+    np.testing.assert_allclose(thick.position("B"), thin.position("B"), atol=2e-7)
+    np.testing.assert_allclose(force_of(thick), force_of(thin), atol=1e-4)
+    assert thick.contacts["c"]["at"] == pytest.approx(thin.contacts["c"]["at"], abs=1e-5)
+    assert abs(thick.contacts["c"]["gap"]) < 1e-12
+    assert thick.certificate.stable is True
+
+
+@pytest.mark.parametrize("axis", [[0, 0, 1], [0, 0, -2]])
+def test_cylinder_in_space_is_a_circle_in_the_plane(axis):
+    plane = solve(cantilever(smaller(DRUM))).last
+    section = {"sections": {"s": {"EI2": 2.0, "EI3": 1.0, "GJ": 1.0}}}
+    cylinder = smaller(DRUM) | {"type": "cylinder", "axis": axis}
+    space = solve(cantilever(cylinder, dimension="space", **section)).last
+    np.testing.assert_allclose(space.position("B"), plane.position("B"), atol=2e-7)
+    np.testing.assert_allclose(force_of(space), force_of(plane), atol=1e-4)
+
+
+def test_what_stretches_little_touches_a_drum_as_what_does_not():
+    stiff = solve(cantilever(DRUM)).last
+    stretched = [solve(cantilever(DRUM, section={"EA": size})).last for size in (1e3, 1e4)]
+    apart = [np.abs(step.position("B") - stiff.position("B")).max() for step in stretched]
+    # First order in the compliance: a tenth of it leaves a tenth.
+    assert apart[0] / apart[1] == pytest.approx(10.0, rel=0.02)
+    assert apart[1] < 1e-3
+
+
+def test_law_of_bending_that_is_linear_is_no_law():
+    law = {"type": "table", "curvature": [-10, 0, 10], "moment": [-10, 0, 10]}
+    plain, bent = (solve(cantilever(FLOOR, **more)).last for more in ({}, {"sections": {"s": {"law": law}}}))
+    np.testing.assert_allclose(bent.position("B"), plain.position("B"), atol=2e-7)
+    np.testing.assert_allclose(force_of(bent), force_of(plain), atol=1e-5)
+
+
+def test_members_and_obstacles_together():
+    """A beam is pressed on another one, whose end is pressed on a floor."""
+    nodes = {
+        "a0": {"position": [0, 0.1], "support": "clamped"},
+        "a1": {"position": [1, 0.1]},
+        "b0": {"position": [0.2, 0], "support": "clamped"},
+        "b1": {"position": [1.4, 0]},
+    }
+    members = {"a": {"nodes": ["a0", "a1"], "section": "s"}, "b": {"nodes": ["b0", "b1"], "section": "s"}}
+    contacts = {
+        "pair": {"type": "members", "members": ["a", "b"], "radius": 0.02},
+        "floor": {"type": "plane", "point": [0, -0.1], "normal": [0, 1], "member": "b"},
+    }
+    loads = {"F": {"type": "force", "node": "a1", "value": [0, -4]}}
+    step = solve(
+        cantilever(FLOOR, nodes=nodes, members=members, loads=loads, contacts=contacts, analysis={"accuracy": 1e-6})
+    ).last
+    floor, pair = step.contacts["floor"], step.contacts["pair"]
+    assert floor["force"][1] > 0.0
+    # The end of the lower one rises beyond the place that is pressed down.
+    assert 0.8 < floor["at"] < 1.0
+    assert step.along("b", np.linspace(0, 1, 2001))["position"][:, 1].min() > -0.1 - 1e-9
+    assert floor["force"][0] == pytest.approx(0.0, abs=1e-9)
+    assert pair["force"][1] > 0.0
+    assert abs(pair["gap"]) < 1e-9
+    held = step.reaction("a0")[0] + step.reaction("b0")[0] + floor["force"]
+    np.testing.assert_allclose(held, [0.0, 4.0, 0.0], atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("contact", "more", "sentence"),
+    [
+        (FLOOR | {"member_radius": -0.1}, {}, "zero or above"),
+        (FLOOR | {"member_radius": "wide"}, {}, "member_radius"),
+        (FLOOR | {"member_radius": 0.4}, {}, r"starts inside, by 0\.1 m"),
+        (FLOOR | {"member_radius": 0.1}, {"analysis": {"type": "path", "range": [0, 1]}}, "accepted: with 'static'"),
+        ({"type": "point", "position": [0.5, -1], "side": [0, 1], "member_radius": 0.1}, {}, "member_radius"),
+    ],
+)
+def test_wrong_input_is_told_in_one_sentence(contact, more, sentence):
+    with pytest.raises(SceneError, match=sentence) as told:
+        cantilever(contact, **more)
+    assert "\n" not in str(told.value)
