@@ -49,6 +49,9 @@ SAME = 0.5
 ALIKE = 1e-9
 """Share of a distance by which a shorter one is no other: rounding is far below, the curve of a member far above."""
 
+LEVEL = 1e-13
+"""Slope of the distance from an obstacle that is rounding, rad."""
+
 NEXT_TO = 0.95
 """Part of half a turn of the smallest circle within which places along members are not near to each other."""
 
@@ -119,6 +122,11 @@ class Pair:
     def key(self) -> PairKey:
         """Its name."""
         return self.contact, self.members
+
+    @property
+    def passable(self) -> bool:
+        """Whether members may have passed each other or the obstacle: what is beyond a plane is inside of it."""
+        return self.stop is None or (self.stop.kind == "round" and self.stop.sign > 0.0)
 
     @property
     def normal(self) -> tuple[float, float, float] | None:
@@ -208,7 +216,7 @@ class Closest:
             padded = np.concatenate([[np.inf], gaps, [np.inf]])
             # Of a member that lies along a plane rounding shall not make a minimum of each sample.
             rounding = ALIKE * np.abs(gaps).max()
-            least = (gaps <= padded[:-2] - rounding) | (padded[:-2] == np.inf)
+            least = (gaps < padded[:-2] - rounding) | (padded[:-2] == np.inf)
             least &= gaps <= padded[2:] + rounding
             least &= gaps < reach + self.lengths[member] * np.diff(places).max()
             i = np.flatnonzero(least)
@@ -236,6 +244,8 @@ class Closest:
             after = at - slope / (np.maximum(np.abs(curvature), TINY) * self.lengths[member])
             outside = ((after <= low) & (low > 0.0)) | ((after >= high) & (high < 1.0))
             after = np.clip(np.where(outside, 0.5 * (low + high), after), 0.0, 1.0)
+            # Where a member lies along an obstacle each place is as good.
+            after = np.where(np.abs(slope) < LEVEL, at, after)
             moved, at = np.abs(after - at).max(initial=0.0), after
             if moved < ARRIVED:
                 break
@@ -491,17 +501,20 @@ def _closest_on_pieces(p: Array, p_end: Array, r: Array, r_end: Array) -> tuple[
 
 def answers(fields: Fields) -> dict[str, dict[str, Any]]:
     """For each contact the ``force`` (3,) N on the member, ``at``, ``gap`` in m, and ``member``; between members of the
-    second one ``other`` and ``other_at``; lists where they touch at several places.
+    second one ``other`` and ``other_at``; with friction the part of the force along the surfaces, ``friction`` (3,) N, and
+    whether it is ``sticking``; lists where they touch at several places.
     """
     scene, found = fields.model.scene, dict[str, dict[str, Any]]()
     closest = Closest(scene)
     for name, contact in scene.contacts.items():
         points = sorted((p for p in fields.model.mesh.points if p.contact == name), key=lambda p: (p.members, p.at))
-        further = ("other", "other_at") if contact.between_members else ()
+        further = ["other", "other_at"] if contact.between_members else []
+        further += ["friction", "sticking"] if contact.friction else []
         if not points:
             pairs = [pair for pair in closest.pairs.values() if pair.contact == name]
             gap = min((gap for pair in pairs if (gap := closest.gap(fields, pair)) is not None), default=None)
             found[name] = {"force": np.zeros(3), "at": None, "gap": gap, "member": None, **dict.fromkeys(further)}
+            found[name] |= {"friction": np.zeros(3)} if contact.friction else {}
             continue
         entries = [_entry(fields, point) for point in points]
         if not contact.between_members:
@@ -515,6 +528,7 @@ def _entry(fields: Fields, point: ContactPoint) -> dict[str, Any]:
     told = fields.contact_point(point)
     places = [fields.positions(m, np.array([x]))[0] for m, x in zip(point.members, told["at"], strict=True)]
     entry = {"force": told["force"], "at": told["at"][0], "member": point.members[0]}
+    entry |= {"friction": told["friction"], "sticking": told["sticks"]} if point.grip is not None else {}
     if len(places) == 2:
         gap = float(np.linalg.norm(places[0] - places[1])) - point.distance
         return {**entry, "gap": gap, "other": point.members[1], "other_at": told["at"][1]}
@@ -535,6 +549,11 @@ def _stretches(fields: Fields, entries: list[dict[str, Any]]) -> list[dict[str, 
             before = found[-1]
             begin = np.atleast_1d(before["at"])[0]
             gap = max(before["gap"], entry["gap"], key=abs)
+            if "friction" in entry:
+                before = before | {
+                    "friction": before["friction"] + entry["friction"],
+                    "sticking": before["sticking"] and entry["sticking"],
+                }
             found[-1] = {
                 **before,
                 "force": before["force"] + entry["force"],

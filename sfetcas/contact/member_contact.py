@@ -10,7 +10,7 @@ The loads are followed from zero in steps so short that no member passes through
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +31,7 @@ from ..solvers.continuation import JUMPED, near_factor
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
 from .closest import Closest, Near, Pair, PairKey
+from .gripping import Gripping
 
 __all__ = ["MemberContact"]
 
@@ -41,8 +42,10 @@ Way = Callable[[Model], Loading]
 ROUNDS = 30
 """Changes of the points at one loading, at most."""
 
-LINE, SHORT = 3, 4.0
-"""Number of points of a pair of members from which on it is taken for a line, and parts into which that is divided."""
+LINE, SHORT, ROUND = 3, 4.0, 0.2
+"""Number of points of a pair of members from which on it is taken for a line, parts into which that is divided, and
+angle of something round along which a part is at most, rad.
+"""
 
 TURN, ITERATIONS = 0.6, 30
 """Largest rotation of a node in a step of Newton's method but the first, rad, and steps at most."""
@@ -53,11 +56,17 @@ STRIDE = 0.5
 FIRST, SHORTEST, AIM = 0.25, 2.0**-14, 0.7
 """First and shortest step, parts of the way; share of a stride that steps aim at."""
 
+TOUCHED = 4e-5
+"""How far places may have moved along each other in a step before they touch, of the size, over the first step."""
+
 NARROW = 2.0**-8
 """Step below which a loss of stability is taken for located, part of the way."""
 
 NEAREST = 1e-3
 """Slope of the distance along a member up to which a place is taken for the nearest one."""
+
+LIES = 1e-9
+"""Half the slope of the distance at the end of a member from which on places beside it are nearer, rad."""
 
 LASTING = 1e-9
 """Share of the largest contact force up to which a force of the wrong sign is rounding."""
@@ -113,6 +122,10 @@ class MemberContact:
         Penetration that is accepted, m.
     redundant : bool or None
         Whether rows of the scene without contact are redundant; None where that is not known.
+    gripping : Gripping
+        Friction.
+    stride, first, rough, finer : float
+        As ``STRIDE``, ``FIRST`` and ``ROUGH``; share of the parts into which lines are divided that is taken.
     lines : set
         Contacts and pairs of members that touch along lines, at nodes of the first one.
     """
@@ -125,6 +138,8 @@ class MemberContact:
         radii = min((pair.distance for pair in self.closest.pairs.values() if pair.stop is None), default=np.inf)
         self.tolerance = min(max(0.1 * accuracy, tolerances.CLOSED) * scene.size, ALLOWED * radii)
         self.leaves = scene.analysis.unstable == "leave"
+        self.gripping = Gripping(scene, self.closest, self._vector)
+        self.stride, self.first, self.rough, self.finer = STRIDE, FIRST, ROUGH, 1.0
         self.jumps: list[float] = []
         self.redundant: bool | None = None
         self.lines: set[PairKey] = set()
@@ -164,25 +179,35 @@ class MemberContact:
 
     def lying(self, start: Solved) -> Solved:
         """An undeformed state with the points where members lie on obstacles."""
-        fields, close = start.fields, tolerances.CLOSED * self.scene.size
+        fields, close, mesh = start.fields, tolerances.CLOSED * self.scene.size, start.model.mesh
         on = [pair for pair in self.closest.pairs.values() if pair.stop is not None]
         found = {(near.pair, near.at): near for near in self.closest.found(fields, close, on)}
         for pair in on:
             (member,) = pair.members
-            along = self.closest.beside(fields, pair, start.model.mesh.cuts[member], close)
+            cuts = mesh.cuts[member]
+            # What is rigid touches with its ends, or where it is curved.
+            along = self.closest.beside(fields, pair, cuts if self._flexible(member) else cuts[[0, -1]], close)
             if len(along) >= LINE and self._flexible(member):
                 self.lines.add(pair.key)
+                mesh = self._divided(mesh, pair, [near.at[0] for near in along])
+                along = self.closest.beside(fields, pair, mesh.cuts[member], close)
                 found = {key: near for key, near in found.items() if near.pair != pair.key}
             elif self._flexible(member):
                 continue
-            found |= {(near.pair, near.at): near for near in along}
+            known = {end for near in found.values() for end in self._ends(near)}
+            found |= {(near.pair, near.at): near for near in along if not known.intersection(self._ends(near))}
         if not found:
             return start
         points = tuple(replace(_begun(near), number=i) for i, near in enumerate(found.values()))
-        prepared = self.prepare(replace(start.model.mesh, points=points))
+        prepared = self.prepare(replace(mesh, points=points))
         nothing = prepared.model.loading(0.0, 0.0)
         state = self._carried(start, prepared)
         return Solved(prepared, state, nothing, prepared.equations.at(state, nothing), 0.0)
+
+    def _ends(self, near: Near) -> list[tuple[str, str]]:
+        """The contact and the node, where a member touches an obstacle at its end."""
+        member, at = near.members[0], near.at[0]
+        return [(near.contact, self.scene.members[member].nodes[int(at)])] if at in (0.0, 1.0) else []
 
     def _flexible(self, member: str) -> bool:
         """Whether elements of a member may be divided where it touches."""
@@ -197,7 +222,7 @@ class MemberContact:
 
         With ``drag`` rotations since another state are resisted, see :class:`~sfetcas.solvers.pseudo_transient.Drag`.
         """
-        points = tuple(replace(point, number=i) for i, point in enumerate(points))
+        points = tuple(self.gripping.set_up(source.fields, replace(p, number=i)) for i, p in enumerate(points))
         prepared = self.prepare(replace(mesh, points=points))
         loading = way(prepared.model)
         state = self._carried(source, prepared)
@@ -217,7 +242,7 @@ class MemberContact:
         target, before = prepared.model, source.model
         state = transferred(before, source.state, target)
         y, lam = state.y.copy(), np.zeros_like(state.lam)
-        numbers = {name: i for i, name in enumerate(target.positions.unknowns)}
+        numbers, had = ({name: i for i, name in enumerate(m.positions.unknowns)} for m in (target, before))
         known = {name: i for i, name in reversed(list(enumerate(before.row_names)))}
         # Points have other numbers than before: rows of points by what they are, all others by their names.
         others = [i for i, name in enumerate(target.row_names) if not name.startswith("contacts.")]
@@ -240,6 +265,9 @@ class MemberContact:
             if former is not None and not point.new:
                 for one, other in zip(former.rows(axes), point.rows(axes), strict=True):
                     lam[rows[other]] = source.state.lam[known[one]]
+                if point.grip is not None and former.grip is not None:
+                    for share in ("across", "along", "along too")[:axes]:
+                        y[numbers[f"{point.pressed}, {share}"]] = source.state.y[had[f"{former.pressed}, {share}"]]
         return replace(state, y=y, lam=lam)
 
     @staticmethod
@@ -266,46 +294,59 @@ class MemberContact:
     def resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float = 0.0) -> Solved | None:
         """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found."""
         tried: set[object] = set()
-        since = source
+        since, solved, several = source, False, False
+        careful = False
         for _ in range(ROUNDS):
             found = self.solved(mesh, points, source, way, since if drag else None, drag)
             if found is None:
-                return None
-            lined = self._with_lines(found)
+                if not (solved and several):
+                    return None
+                # All at once is faster; where that leads nowhere, one after the other.
+                careful, found = True, source
+            lined = None if careful else self._with_lines(found)
             if lined is not None:
-                mesh, points = lined
+                (mesh, points), several = lined, False
             else:
-                points, change = self._changed(found, tried)
-                if not change:
+                points, changes = self._changed(found, tried, careful)
+                several = changes > 1 and not careful
+                if not changes:
                     return found
-            source = found
+            source, solved = found, True
         return None
 
-    def _changed(self, found: Solved, tried: set[object]) -> tuple[Points, bool]:
-        """The points to try next, where they are now, and whether they are others than before."""
+    def _changed(self, found: Solved, tried: set[object], careful: bool) -> tuple[Points, int]:
+        """The points to try next, where they are now, and how many are others than before; at most one if careful."""
         fields, points = found.fields, found.model.mesh.points
         told = [fields.contact_point(point) for point in points]
         now = [replace(point, at=entry["at"]) for point, entry in zip(points, told, strict=True)]
         pushes = np.array([entry["push"] for entry in told])
-        lost = np.array([self._lost(fields, point) for point in now], dtype=bool)
+        wrong = self._wrong(found, now, pushes)
+        more = self._penetrating(fields, [point for point, off in zip(now, wrong, strict=True) if not off])
+        switched, switches = self.gripping.switched(now, told, one=careful)
+        key = frozenset((p.pair, round(p.at[0], 9), p.grip and p.grip.sticks) for p in (*switched, *more))
+        key = frozenset([key, frozenset(np.flatnonzero(wrong).tolist())])
+        if (careful or key in tried) and (wrong.any() or more):
+            # Also where all at once goes round.
+            worst = int(np.argmin(np.where(wrong, pushes, np.inf))) if wrong.any() else -1
+            kept = [point for i, point in enumerate(now) if i != worst]
+            more = () if wrong.any() else more[:1]
+            return (*(self._freed(fields, point) for point in kept), *more), 1
+        tried.add(key)
+        if wrong.any() or more:
+            kept = [point for point, off in zip(switched, wrong, strict=True) if not off]
+            return (*(self._freed(fields, point) for point in kept), *more), int(wrong.sum()) + len(more) + switches
+        kept = self._merged(switched, pushes)
+        freed = tuple(self._freed(fields, point) for point in kept)
+        moved = any(self.gripping.off_centre(fields, *each) for each in zip(points, now, strict=True))
+        return freed, switches or int(moved or freed != tuple(switched))
+
+    def _wrong(self, found: Solved, now: list[ContactPoint], pushes: Array) -> Array:
+        """Whether points, where they are now, are where nothing is nearest, or would have to pull."""
+        lost = np.array([self._lost(found.fields, point) for point in now], dtype=bool)
         rounding = LASTING * np.abs(pushes).max(initial=0.0)
         # Along a line what does not push is left; what slides there may have to stay until it is known.
         wrong = lost | (pushes < -rounding - 1e-12 * found.model.scales.force)
-        wrong |= np.array([self._of_line(point) for point in now], dtype=bool) & (pushes < rounding)
-        kept = [point for point, off in zip(now, wrong, strict=True) if not off]
-        more = self._penetrating(fields, kept)
-        key = frozenset((p.pair, round(p.at[0], 9)) for p in (*kept, *more))
-        if key in tried and (wrong.any() or more):
-            # All at once is faster; where that goes round, one after the other.
-            worst = int(np.argmin(pushes)) if wrong.any() else -1
-            kept = [point for i, point in enumerate(now) if i != worst]
-            more = () if wrong.any() else more[:1]
-        if wrong.any() or more:
-            tried.add(key)
-            return (*(self._freed(fields, point) for point in kept), *more), True
-        kept = self._merged(now, pushes)
-        freed = tuple(self._freed(fields, point) for point in kept)
-        return freed, freed != tuple(now)
+        return wrong | np.array([self._of_line(point) for point in now], dtype=bool) & (pushes < rounding)
 
     def _lost(self, fields: Fields, point: ContactPoint) -> bool:
         """Whether a point is where members are not nearest: where it does not push, nothing else keeps it there."""
@@ -336,8 +377,8 @@ class MemberContact:
         free = [0.0 < x < 1.0 for x in at]
         if not all(free):
             slopes = self.closest.slopes(fields, point.pair, at)
-            # At an end a point goes inwards where that is nearer.
-            free = [0.0 < x < 1.0 or (0.5 - x) * slope < 0.0 for x, slope in zip(at, slopes, strict=True)]
+            # At an end a point goes inwards where that is nearer; what lies there stays.
+            free = [0.0 < x < 1.0 or (0.5 - x) * slope < -LIES for x, slope in zip(at, slopes.tolist(), strict=True)]
         slides = (free[0] and not self._of_line(point), *free[1:])
         same = not point.new and slides == point.slides
         return point if same else replace(point, slides=slides, normal=normal, new=False)
@@ -379,21 +420,32 @@ class MemberContact:
                 continue
             self.lines.add(key)
             places = [point.at[0] for point in own]
-            length = self.scene.center_lines[first].length
-            longest = max((max(places) - min(places)) / SHORT, 0.5 * pair.width / length)
+            longest = self._longest(pair, places)
             low, high = min(places) - longest, max(places) + longest
-            while True:
-                cuts = mesh.cuts[first]
-                long = (np.diff(cuts) > longest) & (cuts[1:] > low) & (cuts[:-1] < high)
-                if not long.any():
-                    break
-                marks = {name: np.zeros(len(c) - 1, bool) for name, c in mesh.cuts.items()}
-                mesh = mesh.refined(marks | {first: long})
+            mesh = self._divided(mesh, pair, places)
             near = self.closest.beside(found.fields, pair, mesh.cuts[first], 0.1 * pair.width)
             inside = [one for one in near if low <= one.at[0] <= high]
             others = tuple(point for point in points if point not in own)
             return mesh, (*others, *map(_begun, inside))
         return None
+
+    def _longest(self, pair: Pair, places: Sequence[float]) -> float:
+        """Longest part of the first member of a pair between places of a line, a fraction of its length."""
+        length = self.closest.lengths[pair.members[0]]
+        turn = np.inf if pair.stop is None or not pair.stop.radius else ROUND * pair.stop.radius / length
+        return float(min(max((max(places) - min(places)) / SHORT, 0.5 * pair.width / length), turn)) * self.finer
+
+    def _divided(self, mesh: Mesh, pair: Pair, places: Sequence[float]) -> Mesh:
+        """A mesh with elements of the first member that are not too long near the places of a line."""
+        first, longest = pair.members[0], self._longest(pair, places)
+        low, high = min(places) - longest, max(places) + longest
+        while True:
+            cuts = mesh.cuts[first]
+            long = (np.diff(cuts) > longest) & (cuts[1:] > low) & (cuts[:-1] < high)
+            if not long.any():
+                return mesh
+            marks = {name: np.zeros(len(c) - 1, bool) for name, c in mesh.cuts.items()}
+            mesh = mesh.refined(marks | {first: long})
 
     # -- steps ------------------------------------------------------------------------------------
 
@@ -406,19 +458,14 @@ class MemberContact:
 
     def _crossings(self, before: Fields, after: Fields) -> list[Near]:
         """Where members are nearest in one state that are on other sides of each other in another one."""
+        pairs = [pair for pair in self.closest.pairs.values() if pair.passable]
         moved = 0.0
-        for member in self.closest.members:
+        for member in {member for pair in pairs for member in pair.members}:
             x = self.closest.samples(after, member)
             apart = after.positions(member, x) - before.positions(member, x)
             moved = max(moved, float(np.linalg.norm(apart, axis=1).max()))
-        return [near for near in self.closest.found(before, 2.0 * moved) if self._crossed(near, after)]
-
-    def _crossed(self, near: Near, fields: Fields) -> bool:
-        stop = self.closest.pairs[near.pair].stop
-        if stop is not None and (stop.kind == "flat" or stop.sign < 0.0):
-            # What is on the wrong side of these is inside of them, and is pushed out again.
-            return False
-        return bool(near.normal @ self._vector(fields, near) <= 0.0)
+        found = self.closest.found(before, 2.0 * moved, pairs)
+        return [near for near in found if near.normal @ self._vector(after, near) <= 0.0]
 
     def turned(self, before: Fields, after: Fields) -> float:
         """Largest angle between tangents of the same place in two states, rad."""
@@ -435,19 +482,28 @@ class MemberContact:
     def follow(self, mesh: Mesh, way: Callable[[float], Way], start: Solved) -> Solved | None:
         """The state at the end of a way, ``way(1)``, from its begin; None if it is lost."""
         self.jumps, falls = [], 0
-        now, step = _Step(0.0, start), FIRST
+        now, step = _Step(0.0, start), self.first
         while now.part < 1.0:
+            self.reached = now
             part, lines = min(1.0, now.part + step), set(self.lines)
-            points = self.points(now.solved)
+            self.gripping.since = now.solved.fields
+            points = tuple(map(self.gripping.begun, self.points(now.solved)))
             there = self.resolved(mesh, points, now.solved, way(part))
             crossings = [] if there is None else self._crossings(now.solved.fields, there.fields)
             if crossings:
                 # Members thinner than the step is long touch where they were nearest before.
                 there = self.resolved(mesh, (*points, *map(_begun, crossings)), now.solved, way(part))
             if there is not None and (
-                self.turned(now.solved.fields, there.fields) > STRIDE or self.passed(now.solved.fields, there.fields)
+                self.turned(now.solved.fields, there.fields) > self.stride or self.passed(now.solved.fields, there.fields)
             ):
                 there = None
+            begun = None if there is None else self.gripping.begins(there.model.mesh.points, TOUCHED * self.first)
+            if begun is not None:
+                # What begins to touch is where it was then: steps end there.
+                step = begun * (part - now.part)
+                if step >= SHORTEST:
+                    self.lines = lines
+                    continue
             there = None if there is None else self._refined(there, way(part))
             mesh = mesh if there is None else replace(there.model.mesh, points=())
             turned = 0.0 if there is None else self.turned(now.solved.fields, there.fields)
@@ -468,14 +524,14 @@ class MemberContact:
                 self.jumps.append(part)
                 there = rest
             # As long as turns by a little less than a stride.
-            longer = min(2.0, AIM * STRIDE / max(turned, 0.1 * STRIDE))
-            now, step = _Step(part, there), longer * (part - now.part) if not falling else FIRST
+            longer = min(2.0, AIM * self.stride / max(turned, 0.1 * self.stride))
+            now, step = _Step(part, there), longer * (part - now.part) if not falling else self.first
         return now.solved
 
     def _refined(self, found: Solved, way: Way) -> Solved | None:
         """The state on a mesh that is fine enough for what is decided on the way; None if it is not found there."""
         for _ in range(REFINED):
-            rough, model = roughness(found.fields) > ROUGH, found.model
+            rough, model = roughness(found.fields) > self.rough, found.model
             marks = {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
             if not any(marked.any() for marked in marks.values()):
                 return found

@@ -84,6 +84,8 @@ class Contact(Record):
         ``"outside"``.  Default: of what is round the outside.
     member_radius : m
         Radius of the surface of the members that an obstacle stops; by default their centre line touches it.
+    friction : 1
+        Coulomb's coefficient: the largest force along the obstacle over that across it.
     restitution : 1
         Speed across the obstacle after an impact over that before, from 0 to 1; of motions alone.
     """
@@ -100,6 +102,7 @@ class Contact(Record):
     members: Annotated[tuple[str, ...] | Literal["all"], BeforeValidator(_members)] | None = None
     side: Annotated[Direction | Literal["inside", "outside"], BeforeValidator(_side)] | None = None
     member_radius: Annotated[float, BeforeValidator(number), AfterValidator(_not_below_zero)] = 0.0
+    friction: Annotated[float, BeforeValidator(number), AfterValidator(_not_below_zero)] = 0.0
     restitution: Annotated[float, BeforeValidator(number), AfterValidator(_share)] = 0.0
 
     @model_validator(mode="after")
@@ -108,7 +111,7 @@ class Contact(Record):
         given = {key for key in self.model_fields_set if getattr(self, key) is not None}
         for key in sorted(needed - given):
             raise SceneError(f"the key {key!r} is missing: a {self.type} needs {' and '.join(sorted(needed))}")
-        for key in sorted(given - needed - possible - {"type", "member", "members", "restitution"}):
+        for key in sorted(given - needed - possible - {"type", "member", "members", "restitution", "friction"}):
             what = "members touch each other" if self.between_members else f"the obstacle is a {self.type}"
             raise SceneError(f"not accepted: {what}", (key,))
         if (self.member is None) == (self.members is None):

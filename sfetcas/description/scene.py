@@ -314,9 +314,15 @@ class Scene(Record):
         return any(
             contact.between_members
             or contact.member_radius > 0.0
+            or contact.friction > 0.0
             or any(_of_points(self, contact, member) for member in members_of(contact, self.members))
             for contact in self.contacts.values()
         )
+
+    @property
+    def rubs(self) -> bool:
+        """Whether there is friction where members touch, so that the order of the steps matters."""
+        return any(contact.friction > 0.0 for contact in self.contacts.values())
 
     @property
     def hits(self) -> bool:
@@ -1038,6 +1044,8 @@ def _why_points(scene: Scene, name: str) -> str:
         return "contact between members"
     if contact.member_radius > 0.0:
         return "a radius of members on an obstacle"
+    if contact.friction > 0.0:
+        return "friction"
     members = (m for m in members_of(contact, scene.members) if _of_points(scene, contact, m))
     return next((f"an obstacle of {member!r}, which has a law or stretches" for member in members), "")
 

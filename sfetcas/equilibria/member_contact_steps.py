@@ -27,7 +27,7 @@ from .single import finished, unjudged
 from .solution import Equilibrium, refuse_large
 from .ways import NO_ENERGY, Ways
 
-__all__ = ["MemberContactSteps"]
+__all__ = ["MemberContactSteps", "on_way"]
 
 NEAR = 0.5
 """Rotation, rad, from mesh to mesh up to which a state is the same."""
@@ -64,7 +64,7 @@ class MemberContactSteps:
         SceneError, SolveError
             Members penetrate each other in the undeformed scene; no equilibrium was found.
         """
-        zero = self._undeformed(pilot)
+        zero = self.undeformed(pilot)
         if not self.checked:
             self.run.redundant = redundant(pilot.equations, zero.point)
             self.run.refuse_penetrating(zero.fields)
@@ -79,7 +79,8 @@ class MemberContactSteps:
         return self._refined(found, factor, (*notes, *more))
 
     @staticmethod
-    def _undeformed(pilot: Prepared) -> Solved:
+    def undeformed(pilot: Prepared) -> Solved:
+        """The undeformed scene as a state."""
         nothing = pilot.model.loading(0.0, 0.0)
         state = pilot.equations.start(nothing)
         return Solved(pilot, state, nothing, pilot.equations.at(state, nothing), 0.0)
@@ -124,7 +125,7 @@ class MemberContactSteps:
                 start = self._known(self.run.relaxed(mesh, zero, lambda model: model.loading(begin)))
         notes: tuple[str, ...] = ()
         for a, b in itertools.pairwise(stops_between(self.scene, begin, factor)):
-            start = self._known(self.run.follow(mesh, partial(_on_way, a, b), start))
+            start = self._known(self.run.follow(mesh, partial(on_way, a, b), start))
             notes += self.run.notes(a, b)
         return start, notes
 
@@ -197,6 +198,6 @@ class MemberContactSteps:
         return there
 
 
-def _on_way(begin: float, end: float, part: float) -> Callable[[Model], Loading]:
+def on_way(begin: float, end: float, part: float) -> Callable[[Model], Loading]:
     """The loading of a model on the way from one factor to another."""
     return lambda model: between(model, begin, end)(part)

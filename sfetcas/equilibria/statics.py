@@ -100,6 +100,8 @@ class LoadSteps:
         if self.scene.remembers:
             return self._remembered(begin)
         pilot = self.meshes.prepared(self.meshes.pilot_mesh)
+        if self.scene.rubs:
+            return self._rubbed(pilot, begin)
         further, contact = self._further(pilot), self._contact()
         steps: list[Equilibrium] = []
         last: tuple[float, EquilibriumResult] | None = None
@@ -127,6 +129,17 @@ class LoadSteps:
         reached = all((step.certificate.error_estimate or 0.0) <= self.meshes.accuracy for step in steps)
         status = Status.SOLVED if reached or not self.meshes.asked else Status.SHORT
         return Solution(self.scene, status, tuple(steps), self.meshes.seconds)
+
+    def _rubbed(self, pilot: Prepared, begin: float) -> Solution:
+        """The load steps where there is friction."""
+        from .rough_contact_steps import RoughContactSteps
+
+        sequence = RoughContactSteps(self.meshes, self.ways, self.refinement)
+        try:
+            return self._solved(sequence.answers(pilot), begin)
+        except SolveError as error:
+            self.meshes.seconds["solve"] = time.perf_counter() - begin - self.meshes.seconds["model"]
+            raise at_factor(error, self.scene, *sequence.failed, self.meshes.seconds) from None
 
     def _remembered(self, begin: float) -> Solution:
         """The load steps where laws have memory."""

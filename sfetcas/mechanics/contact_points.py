@@ -14,7 +14,18 @@ On an obstacle ``d`` begins at its place, a point of a plane, a centre or an axi
 
     n . d - radius_1      or      |d - (a . d) a| - (radius_1 + radius),      inside of it with the opposite sign.
 
-Source: Konyukhov and Izadi 2015, Introduction to Computational Contact Mechanics, chapter 11 (contact of curves).
+With friction the force on the first member is ``N n + T``, with ``N`` and the shares ``T_k`` of ``T`` along two
+directions across ``n`` as unknowns: the displacements of a place at which nothing else is, and the forces on this place
+are what they miss.  With the slip ``v``, how far places of the members that touch have moved along each other since the
+last state of a way,
+
+    v = d - d_0 - t_1 s + t_2 t,      sticks: v_k = 0,      slides: T = mu N w / |w|,      w = T - v,
+
+where ``d_0`` and ``t`` are the vector and the tangents there in the last state.  Where ``T`` opposes ``v`` the second
+is Coulomb's law.  That the place is the nearest one then is ``N n . t = 0``, without what friction does along members.
+
+Source: Konyukhov and Izadi 2015, Introduction to Computational Contact Mechanics, chapter 11 (contact of curves);
+Alart and Curnier 1991 (friction as an equation).
 """
 
 from __future__ import annotations
@@ -113,17 +124,108 @@ class Gap(Term):
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """The gap."""
+        return [self.gap(ca.vertcat(*u[0]), data)]
+
+    def gap(self, moved: ca.SX, data: ca.SX) -> ca.SX:
+        """The gap where the vector has changed by some displacement (axes,)."""
         *ways, begin = ca.vertsplit(data[:-1], self.axes)
-        between, distance = begin + ca.vertcat(*u[0]), data[-1]
+        between, distance = begin + moved, data[-1]
         if self.directed:
-            return [ca.dot(ways[0], between) - distance]
+            return ca.dot(ways[0], between) - distance
         if self.across:
             between = between - ca.dot(ways[0], between) * ways[0]
-        return [(-1.0 if self.inside else 1.0) * ca.norm_2(between) - distance]
+        return (-1.0 if self.inside else 1.0) * ca.norm_2(between) - distance
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """The contact force, above zero where it is a push."""
         return [-lam[0]]
+
+
+@final
+@dataclass(frozen=True)
+class Rough(Term):
+    """Contact with friction at a point.
+
+    Places: the vector, the forces, the places on the members.  Data: of the gap, the coefficient, directions along, the
+    vector of the last state less that where the search begins, tangents of the members in the last state, and now.
+
+    Attributes
+    ----------
+    smooth : Gap
+        The gap.
+    members : int
+        Two, or one on an obstacle.
+    sticks : bool
+        Whether it does, or slides.
+    """
+
+    smooth: Gap
+    members: int
+    sticks: bool
+
+    table: ClassVar[str] = "contacts"
+    answers: ClassVar[Mapping[str, str]] = {
+        "push": "N",
+        **{f"friction {axis}": "N" for axis in "xyz"},
+        **{f"slip {axis}": "m" for axis in "xyz"},
+    }
+
+    @property
+    def has_potential(self) -> bool:
+        """It has none."""
+        return False
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """Its places; no rows."""
+        return 0, 2 + self.members, 0, self.smooth.sizes[3] + 1 + self.axes * (self.axes + 2 * self.members), 0
+
+    def _parts(self, u: list[Side], data: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, list[ca.SX]]:
+        """The gap, its normal, friction (axes,), the slip (axes,), and the tangents of the members."""
+        n, own = self.axes, data[self.smooth.sizes[3] + 1 :]
+        vectors = ca.vertsplit(own, n)
+        frame, origin, tangents = vectors[: n - 1], vectors[n - 1], vectors[n:]
+        vector = ca.SX.sym("vector", n)
+        gap = self.smooth.gap(vector, data[: self.smooth.sizes[3]])
+        moved = ca.vertcat(*u[0])
+        gap, normal = (ca.substitute(one, vector, moved) for one in (gap, ca.gradient(gap, vector)))
+        force = sum((share * way for share, way in zip(u[1][1:], frame, strict=True)), start=ca.SX.zeros(n))
+        slip = moved - origin
+        for place, tangent, sign in zip(u[2:], tangents, (1.0, -1.0), strict=False):
+            slip = slip - sign * place[0] * tangent
+        along = [one - ca.dot(one, normal) * normal for one in (force, slip)]
+        return gap, normal, along[0], along[1], tangents[self.members :]
+
+    def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """On the vector minus the force of the point; on the forces what they miss; along the members."""
+        gap, normal, friction, slip, tangents = self._parts(u, data)
+        coefficient, n = data[self.smooth.sizes[3]], self.axes
+        frame = ca.vertsplit(data[self.smooth.sizes[3] + 1 :], n)[: n - 1]
+        if self.sticks:
+            missing = [-ca.dot(slip, way) - YIELDING * share for way, share in zip(frame, u[1][1:], strict=True)]
+        else:
+            way = friction - slip
+            way = coefficient * u[1][0] * way / ca.sqrt(ca.dot(way, way) + NOWHERE)
+            missing = [share - ca.dot(way, along) for share, along in zip(u[1][1:], frame, strict=True)]
+        nothing = [ca.SX(0)] * (n - 1)
+        pairs = zip(tangents, (1.0, -1.0), strict=False)
+        along = [part for tangent, sign in pairs for part in (sign * ca.dot(friction, tangent), *nothing)]
+        return [*ca.vertsplit(-u[1][0] * normal - friction), -gap - YIELDING * u[1][0], *missing, *along]
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The force across, friction (3,) on the first member, and how far that has slipped (3,)."""
+        _, _, friction, slip, _ = self._parts(u, data)
+        nothing = [ca.SX(0)] * (3 - self.axes)
+        return [u[1][0], *ca.vertsplit(friction), *nothing, *ca.vertsplit(slip), *nothing]
+
+
+YIELDING = 1e-9
+"""How far what is rough gives way, dimensionless: what is shared among several places of something rigid,
+or that keeps its length, is shared evenly.
+"""
+
+NOWHERE = 1e-40
+"""Square of a force and a slip that have no direction."""
 
 
 def undeformed_distance(scene: Scene, point: ContactPoint) -> Array:
@@ -151,9 +253,19 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
                 continue
             yield from guided(parts, Meeting, (point.name,) * 2, (member, point.at[side]), slides[side], side == 1)
         gap, ways = _gap(parts.scene, point, space)
-        data = np.append(undeformed_distance(parts.scene, point)[:axes], point.distance) / unit
+        begin = undeformed_distance(parts.scene, point)
+        data = np.append(begin[:axes], point.distance) / unit
         data = np.concatenate([*(way[:axes] for way in ways), data])
-        yield One(gap, point.name, "", numbers(data), (), (between,), f"{point.name}, gap")
+        grip = point.grip
+        if grip is None:
+            yield One(gap, point.name, "", numbers(data), (), (between,), f"{point.name}, gap")
+            continue
+        origin = (np.array(grip.origin) - begin)[:axes] / unit
+        further = [np.array(one)[:axes] for one in (*grip.before, *grip.now)]
+        frame = [np.array(one)[:axes] for one in grip.frame]
+        data = np.concatenate([data, [grip.coefficient], *frame, origin, *further])
+        places = (between, segments.place(point.pressed), *slides)
+        yield One(Rough(space, gap, len(point.members), grip.sticks), point.name, "", numbers(data), (), places)
 
 
 def _gap(scene: Scene, point: ContactPoint, space: bool) -> tuple[Gap, list[Array]]:

@@ -154,12 +154,19 @@ class Fields:
     def contact_point(self, point: ContactPoint) -> dict[str, Any]:
         """Where members touch, ``at`` as fractions of their lengths, the ``force`` (3,) N on the first one, and its
         size ``push`` N, below zero where it would be a pull.
+
+        With friction ``push`` is the size of the part across, ``friction`` (3,) N the part along, ``slip`` (3,) m how
+        far the first one has slipped since the last state of the way, and ``sticks`` whether it sticks.
         """
         found, lines = self.balance.answers("contacts", point.name), self.model.scene.center_lines
         moved = (found["moved on first"], found["moved on second"])
         at = tuple(a + s / lines[m].length for a, s, m in zip(point.at, moved, point.members, strict=False))
         force = np.array([found[f"force {axis}"] for axis in "xyz"])
-        return {"at": at, "force": force, "push": found["push"]}
+        answer = {"at": at, "force": force, "push": found["push"]}
+        if point.grip is not None:
+            answer |= {key: np.array([found[f"{key} {axis}"] for axis in "xyz"]) for key in ("friction", "slip")}
+            answer["sticks"] = point.grip.sticks
+        return answer
 
     @functools.cached_property
     def _pushed(self) -> dict[str, list[tuple[float, Array]]]:

@@ -21,6 +21,7 @@ from .carried import carried, magnetic, natural_turning
 
 __all__ = [
     "ContactPoint",
+    "Grip",
     "Cushion",
     "Mesh",
     "Remembered",
@@ -74,6 +75,42 @@ class Touch:
         return (self.at,) if self.to is None else (self.at, self.to)
 
 
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Grip:
+    """Friction at a point of contact since the last state of a way.
+
+    Attributes
+    ----------
+    coefficient : float
+        Coulomb's.
+    sticks : bool
+        Whether the places that touch stay together; else they slide.
+    frame : tuple of vectors
+        Directions across the normal, one in the plane and two in space.
+    origin : vector
+        The vector of the point, as of :class:`ContactPoint`, between the same places of the members in the last state,
+        or when they began to touch, m.
+    before, now : tuple of vectors
+        Unit tangents of the members there, in the last state and now.
+    touched : vector
+        How far the places had moved along each other since the last state when they began to touch, m.
+    share : float
+        Of the step from the last state, after which they began to touch.
+    """
+
+    coefficient: float
+    sticks: bool
+    frame: tuple[Vector, ...]
+    origin: Vector
+    before: tuple[Vector, ...]
+    now: tuple[Vector, ...]
+    touched: Vector = (0.0, 0.0, 0.0)
+    share: float = 0.0
+
+
 @dataclass(frozen=True)
 class ContactPoint:
     """A place where two members touch, a member touches itself, or a member touches an obstacle.
@@ -95,10 +132,12 @@ class ContactPoint:
         centre line, m; negative inside of what is round.
     number : int
         Distinguishes the points of one record.
-    normal : (float, float, float), optional
+    normal : vector, optional
         Direction along which the distance is measured: that of a plane; of what is new.
     new : bool
         Whether it is not yet known how hard it pushes: where it is is no unknown, and the normal is a given one.
+    grip : Grip, optional
+        Friction, where there is any.
     """
 
     contact: str
@@ -107,8 +146,9 @@ class ContactPoint:
     slides: tuple[bool, ...]
     distance: float
     number: int = 0
-    normal: tuple[float, float, float] | None = None
+    normal: Vector | None = None
     new: bool = False
+    grip: Grip | None = None
 
     @property
     def name(self) -> str:
@@ -126,7 +166,13 @@ class ContactPoint:
 
     def rows(self, axes: int) -> list[str]:
         """Names of its rows in the plane (two axes) or in space: of the vector between centre lines, and the gap."""
-        return [*(f"{self.name}, {axis + 1} of {axes}" for axis in range(axes)), f"{self.name}, gap"]
+        gap = [] if self.grip else [f"{self.name}, gap"]
+        return [*(f"{self.name}, {axis + 1} of {axes}" for axis in range(axes)), *gap]
+
+    @property
+    def pressed(self) -> str:
+        """Name of the place whose displacements are its forces across and along, where there is friction."""
+        return f"forces of {self.name}"
 
     @property
     def between(self) -> str:

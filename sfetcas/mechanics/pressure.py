@@ -27,7 +27,7 @@ def is_pressure(scene: Scene) -> bool:
     if scene.resolved_dimension == "space" or scene.stretches or scene.shifted:
         return False
     # Friction has none.
-    if any(tendon.rubs for tendon in scene.tendons.values()):
+    if scene.rubs or any(tendon.rubs for tendon in scene.tendons.values()):
         return False
     # By history, of what ends at a node, or within a member at a fraction of its length.
     left: dict[tuple[str | None, str | tuple[str, float]], float] = {}

@@ -357,6 +357,8 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     for point in mesh.points:
         strained |= {point.place(side): {0: "arc length"} for side, free in enumerate(point.slides) if free}
         strained[point.between] = dict(enumerate(axes))
+        if point.grip is not None:
+            strained[point.pressed] = dict(enumerate(("across", "along", "along too")[: len(axes)]))
     return Segments(
         (*places, *strained),
         frozenset(retained | set(strained)),

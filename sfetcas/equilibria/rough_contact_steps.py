@@ -1,0 +1,137 @@
+"""Load steps of scenes with friction where members touch: the whole sequence of steps again and again, more finely.
+
+What slides depends on all that was before, so that no step can be solved by itself, or refined by itself.  The sequence
+is followed from the undeformed scene on one mesh with steps of one length, then on halved elements with steps of half
+the length, until two sequences agree.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+from ..contact.member_contact import MemberContact
+from ..description.inserting import stops_between
+from ..errors import SolveError, Status
+from ..mechanics.mesh import Mesh
+from ..solvers.prepared import Prepared, Solved
+from ..solvers.redundancy import redundant
+from .force_balance import refuse_lost_forces
+from .member_contact_steps import MemberContactSteps, on_way
+from .meshing import Meshing
+from .refinement import MOST_ELEMENTS, Refinement
+from .single import finished, unjudged
+from .solution import Equilibrium, refuse_large
+from .ways import Ways
+
+__all__ = ["RoughContactSteps"]
+
+LEVELS = 6
+"""Sequences at most."""
+
+ORDER_MATTERS = "with friction: what slides depends on the order of the steps"
+"""A note."""
+
+
+class RoughContactSteps:
+    """The load steps of a scene with friction where members touch.
+
+    Parameters
+    ----------
+    meshes, ways, refinement
+        Of the scene, see :class:`~sfetcas.equilibria.statics.LoadSteps`.
+    """
+
+    def __init__(self, meshes: Meshing, ways: Ways, refinement: Refinement) -> None:
+        self.meshes, self.refinement, self.scene = meshes, refinement, meshes.scene
+        self.simple = MemberContactSteps(meshes, ways, refinement)
+        self.failed: tuple[float, list[Equilibrium]] = (0.0, [])
+
+    def answers(self, pilot: Prepared) -> list[Equilibrium]:
+        """The equilibria of all steps.
+
+        Raises
+        ------
+        SceneError, SolveError
+            Members penetrate each other in the undeformed scene; a step has no equilibrium that could be found,
+            ``failed`` says which.
+        """
+        target = self.meshes.target
+        mesh = target if self.meshes.fixed else replace(pilot.model.mesh, order=target.order)
+        before: list[Solved] = []
+        errors: Sequence[float] = ()
+        for level in range(LEVELS):
+            now, run, notes = self._sequence(mesh, level)
+            if before:
+                # Of first order where what slides is decided: what is left is not less than what the halving changed.
+                judged = [self.meshes.judged(unjudged(a), unjudged(b)) for a, b in zip(before, now, strict=True)]
+                deep = [run.penetration(one.fields) / self.scene.size for one in now]
+                errors = [max(*pair, depth) for pair, depth in zip(judged, deep, strict=True)]
+                kept = before if self.meshes.prescribed else now
+                if self.meshes.prescribed or max(errors) <= self.meshes.accuracy or self._large(now):
+                    return [self._answer(*each) for each in zip(kept, errors, notes, strict=True)]
+            before, mesh = now, mesh.refined()
+        return [self._answer(*each) for each in zip(before, errors, notes, strict=True)]
+
+    @staticmethod
+    def _large(found: Sequence[Solved]) -> bool:
+        return found[-1].model.mesh.elements > MOST_ELEMENTS
+
+    def _sequence(self, mesh: Mesh, level: int) -> tuple[list[Solved], MemberContact, list[tuple[str, ...]]]:
+        """The states of all steps, followed from the undeformed scene, and notes on each."""
+        run = MemberContact(self.scene, self.meshes.prepared, self.meshes.accuracy, self.meshes.fixed)
+        run.stride, run.first = run.stride * 0.5**level, run.first * 0.5**level
+        run.rough, run.finer = run.rough * 0.1**level, 0.5**level
+        prepared = self.meshes.prepared(mesh)
+        zero = self.simple.undeformed(prepared)
+        run.redundant = redundant(prepared.equations, zero.point)
+        run.refuse_penetrating(zero.fields)
+        now, last = run.lying(zero), 0.0
+        found, notes = list[Solved](), list[tuple[str, ...]]()
+        self.failed = (0.0, [])
+        if self.scene.histories:
+            now = self._known(run, run.follow(mesh, lambda t: lambda model: model.loading(0.0, t), now), 0.0, 0.0)
+        for factor in self.scene.analysis.steps:
+            self.failed = (factor, [])
+            told: tuple[str, ...] = (ORDER_MATTERS,)
+            for a, b in itertools.pairwise(stops_between(self.scene, last, factor)):
+                mesh = replace(now.model.mesh, points=())
+                now = self._known(run, run.follow(mesh, partial(on_way, a, b), now), a, b)
+                told += run.notes(a, b)
+            found.append(now)
+            notes.append(told)
+            last = factor
+        return found, run, notes
+
+    def _known(self, run: MemberContact, found: Solved | None, begin: float, end: float) -> Solved:
+        """The state at the end of a way.
+
+        Raises
+        ------
+        SolveError
+            There is none; the message says how far it was followed, and whether all slides there.
+        """
+        if found is not None:
+            return found
+        last = run.reached
+        reached = begin + last.part * (end - begin)
+        grips = [point.grip for point in last.solved.model.mesh.points if point.grip is not None]
+        slides = bool(grips) and not any(grip.sticks for grip in grips)
+        what = "where all that touches slides" if slides else "and no further while members touch"
+        detail = f"the loads were followed to the factor {reached:.5g}, {what}"
+        raise SolveError(Status.FAILED, f"{detail}: {', '.join(f'contacts.{name}' for name in self.scene.contacts)}")
+
+    def _answer(self, found: Solved, error: float, notes: tuple[str, ...]) -> Equilibrium:
+        refuse_large(found.fields)
+        answer = finished(
+            found,
+            found.stability,
+            notes=notes,
+            way=("in contact",),
+            error_estimate=error,
+            error_of=self.meshes.error_of,
+        )
+        refuse_lost_forces(answer)
+        return answer
