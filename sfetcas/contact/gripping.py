@@ -6,9 +6,8 @@ when they began to touch: between the two states that is in the ratio of the gap
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -18,15 +17,17 @@ from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Grip, Vector
 from .closest import Closest
 
-__all__ = ["Gripping"]
+__all__ = ["FIRM", "Gripping"]
 
 CENTRED = 1e-4
 """Angle, rad, and share of the size of the scene, by which a point may have moved from where friction is set up there:
 what that leaves out is of second order.
 """
 
-LIMIT = 1e-9
-"""Share by which friction may exceed its limit: between there and the limit what sticks and what slides are alike."""
+FIRM = (1e4, 1.0, 1e6, 0.0)
+"""Numbers ``c`` of :mod:`~sfetcas.mechanics.contact_points`, dimensionless, that are tried one after the other; with
+the last what is new sticks, all else has the first.
+"""
 
 
 @dataclass(eq=False)
@@ -41,17 +42,19 @@ class Gripping:
         (fields, point) -> the vector (3,) of a point, m.
     since : Fields or None
         The last state of the way; None where there is none, so that nothing has slipped.
+    firm : float
+        As of :class:`~sfetcas.mechanics.mesh.Grip`.
     """
 
     scene: Scene
     closest: Closest
     vector: Callable[[Fields, ContactPoint], Array]
     since: Fields | None = None
+    firm: float = FIRM[0]
 
-    @property
-    def none(self) -> bool:
-        """Whether no contact has friction."""
-        return not any(contact.friction for contact in self.scene.contacts.values())
+    def change(self) -> None:
+        """Take the next of the numbers that Newton's method depends on."""
+        self.firm = FIRM[(FIRM.index(self.firm) + 1) % len(FIRM)]
 
     def set_up(self, fields: Fields, point: ContactPoint) -> ContactPoint:
         """A point with its friction where it is now."""
@@ -69,12 +72,11 @@ class Gripping:
             touched = share * (self.vector(fields, point) - apart)
         else:
             touched, share = np.array(point.grip.touched), point.grip.share
-        sticks = True if point.grip is None else point.grip.sticks
         return replace(
             point,
             grip=Grip(
                 coefficient,
-                sticks,
+                self.firm or (0.0 if point.new else FIRM[0]),
                 tuple(_told(way) for way in _across(normal, np.array(now[0]), fields.model.space)),
                 _told(apart + touched),
                 self._tangents(since, point),
@@ -88,41 +90,18 @@ class Gripping:
         """Share of a step after which places begin to touch, the first of those that have moved before by more than a
         share of the size of the scene; None where none has.
         """
-        late = [p.grip for p in points if p.grip is not None and np.linalg.norm(p.grip.touched) > limit * self.scene.size]
+        late = [
+            p.grip for p in points if p.grip is not None and np.linalg.norm(p.grip.touched) > limit * self.scene.size
+        ]
         return min((grip.share for grip in late), default=None)
 
     def begun(self, point: ContactPoint) -> ContactPoint:
         """A point of a state from which the next step of a way begins."""
-        return point if point.grip is None else replace(point, grip=replace(point.grip, touched=(0.0, 0.0, 0.0), share=0.0))
-
-    def switched(
-        self, points: Sequence[ContactPoint], told: Sequence[dict[str, Any]], one: bool
-    ) -> tuple[list[ContactPoint], int]:
-        """Solved points as they stick or slide from now on, ``one`` after the other or all that are to; how many do.
-
-        ``told`` is of each what :meth:`.Fields.contact_point` tells.
-        """
-        excess = np.array([self._excess(*each) for each in zip(points, told, strict=True)])
-        chosen = excess > 0.0
-        if one and chosen.any():
-            chosen &= np.arange(len(points)) == int(np.argmax(excess))
-        found = [
-            replace(point, grip=replace(point.grip, sticks=not point.grip.sticks)) if switch and point.grip else point
-            for point, switch in zip(points, chosen.tolist(), strict=True)
-        ]
-        return found, int(chosen.sum())
-
-    def _excess(self, point: ContactPoint, told: dict[str, Any]) -> float:
-        """By which share of its limit friction of what sticks exceeds it; without bound for what slides and is to stick,
-        as friction would push it on; else zero.
-        """
-        if point.grip is None or told["push"] <= 0.0:
-            return 0.0
-        limit = point.grip.coefficient * told["push"]
-        if not point.grip.sticks:
-            return np.inf if told["friction"] @ told["slip"] > LIMIT * limit * self.scene.size else 0.0
-        excess = float(np.linalg.norm(told["friction"])) / limit - 1.0
-        return excess if excess > LIMIT else 0.0
+        return (
+            point
+            if point.grip is None
+            else replace(point, grip=replace(point.grip, touched=(0.0, 0.0, 0.0), share=0.0))
+        )
 
     def off_centre(self, fields: Fields, point: ContactPoint, now: ContactPoint) -> bool:
         """Whether a point has moved so far that friction has to be set up again where it is."""
@@ -152,7 +131,7 @@ class Gripping:
 
 
 def _across(normal: Array, tangent: Array, space: bool) -> list[Array]:
-    """Unit vectors (3,) across a normal: one in the plane, two in space, the first along a tangent where that is one."""
+    """Unit vectors (3,) across a normal: one in the plane, two in space, the first along a tangent if it can be."""
     first = np.cross([0.0, 0.0, 1.0], normal)
     if not space:
         return [first]

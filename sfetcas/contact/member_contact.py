@@ -31,7 +31,7 @@ from ..solvers.continuation import JUMPED, near_factor
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
 from .closest import Closest, Near, Pair, PairKey
-from .gripping import Gripping
+from .gripping import FIRM, Gripping
 
 __all__ = ["MemberContact"]
 
@@ -222,8 +222,18 @@ class MemberContact:
 
         With ``drag`` rotations since another state are resisted, see :class:`~sfetcas.solvers.pseudo_transient.Drag`.
         """
-        points = tuple(self.gripping.set_up(source.fields, replace(p, number=i)) for i, p in enumerate(points))
-        prepared = self.prepare(replace(mesh, points=points))
+        numbered = [replace(point, number=i) for i, point in enumerate(points)]
+        for _ in FIRM if self.scene.rubs and points else (1.0,):
+            set_up = tuple(self.gripping.set_up(source.fields, point) for point in numbered)
+            found = self._corrected(replace(mesh, points=set_up), source, way, since, drag)
+            if found is not None:
+                return found
+            self.gripping.change()
+        return None
+
+    def _corrected(self, mesh: Mesh, source: Solved, way: Way, since: Solved | None, drag: float) -> Solved | None:
+        """The equilibrium on a mesh with its points, as of :meth:`solved`."""
+        prepared = self.prepare(mesh)
         loading = way(prepared.model)
         state = self._carried(source, prepared)
         # Seen without contact, whose rows depend on others only nearly, where places are beside each other.
@@ -322,9 +332,8 @@ class MemberContact:
         pushes = np.array([entry["push"] for entry in told])
         wrong = self._wrong(found, now, pushes)
         more = self._penetrating(fields, [point for point, off in zip(now, wrong, strict=True) if not off])
-        switched, switches = self.gripping.switched(now, told, one=careful)
-        key = frozenset((p.pair, round(p.at[0], 9), p.grip and p.grip.sticks) for p in (*switched, *more))
-        key = frozenset([key, frozenset(np.flatnonzero(wrong).tolist())])
+        states = ["wrong" if off else "right" for off in wrong] + ["new"] * len(more)
+        key = frozenset((p.pair, round(p.at[0], 9), now) for p, now in zip((*now, *more), states, strict=True))
         if (careful or key in tried) and (wrong.any() or more):
             # Also where all at once goes round.
             worst = int(np.argmin(np.where(wrong, pushes, np.inf))) if wrong.any() else -1
@@ -333,12 +342,12 @@ class MemberContact:
             return (*(self._freed(fields, point) for point in kept), *more), 1
         tried.add(key)
         if wrong.any() or more:
-            kept = [point for point, off in zip(switched, wrong, strict=True) if not off]
-            return (*(self._freed(fields, point) for point in kept), *more), int(wrong.sum()) + len(more) + switches
-        kept = self._merged(switched, pushes)
+            kept = [point for point, off in zip(now, wrong, strict=True) if not off]
+            return (*(self._freed(fields, point) for point in kept), *more), int(wrong.sum()) + len(more)
+        kept = self._merged(now, pushes)
         freed = tuple(self._freed(fields, point) for point in kept)
         moved = any(self.gripping.off_centre(fields, *each) for each in zip(points, now, strict=True))
-        return freed, switches or int(moved or freed != tuple(switched))
+        return freed, int(moved or freed != tuple(now))
 
     def _wrong(self, found: Solved, now: list[ContactPoint], pushes: Array) -> Array:
         """Whether points, where they are now, are where nothing is nearest, or would have to pull."""
@@ -494,7 +503,8 @@ class MemberContact:
                 # Members thinner than the step is long touch where they were nearest before.
                 there = self.resolved(mesh, (*points, *map(_begun, crossings)), now.solved, way(part))
             if there is not None and (
-                self.turned(now.solved.fields, there.fields) > self.stride or self.passed(now.solved.fields, there.fields)
+                self.turned(now.solved.fields, there.fields) > self.stride
+                or self.passed(now.solved.fields, there.fields)
             ):
                 there = None
             begun = None if there is None else self.gripping.begins(there.model.mesh.points, TOUCHED * self.first)

@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from ..contact.member_contact import MemberContact
 from ..description.inserting import stops_between
 from ..errors import SolveError, Status
@@ -30,6 +32,9 @@ __all__ = ["RoughContactSteps"]
 
 LEVELS = 6
 """Sequences at most."""
+
+NEARLY = 0.99
+"""Share of the limit of friction from which on what touches is said to be about to slide."""
 
 ORDER_MATTERS = "with friction: what slides depends on the order of the steps"
 """A note."""
@@ -111,15 +116,19 @@ class RoughContactSteps:
         Raises
         ------
         SolveError
-            There is none; the message says how far it was followed, and whether all slides there.
+            There is none; the message says how far it was followed, and whether all is about to slide there.
         """
         if found is not None:
             return found
         last = run.reached
         reached = begin + last.part * (end - begin)
-        grips = [point.grip for point in last.solved.model.mesh.points if point.grip is not None]
-        slides = bool(grips) and not any(grip.sticks for grip in grips)
-        what = "where all that touches slides" if slides else "and no further while members touch"
+        fields, points = last.solved.fields, last.solved.model.mesh.points
+        told = [fields.contact_point(point) for point in points if point.grip is not None]
+        grips = [point.grip for point in points if point.grip is not None]
+        limits = [grip.coefficient * one["push"] for grip, one in zip(grips, told, strict=True)]
+        sizes = [float(np.linalg.norm(one["friction"])) for one in told]
+        slides = bool(told) and all(size >= NEARLY * limit for size, limit in zip(sizes, limits, strict=True))
+        what = "where all that touches is about to slide" if slides else "and no further while members touch"
         detail = f"the loads were followed to the factor {reached:.5g}, {what}"
         raise SolveError(Status.FAILED, f"{detail}: {', '.join(f'contacts.{name}' for name in self.scene.contacts)}")
 

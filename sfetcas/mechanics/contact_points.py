@@ -19,10 +19,11 @@ directions across ``n`` as unknowns: the displacements of a place at which nothi
 are what they miss.  With the slip ``v``, how far places of the members that touch have moved along each other since the
 last state of a way,
 
-    v = d - d_0 - t_1 s + t_2 t,      sticks: v_k = 0,      slides: T = mu N w / |w|,      w = T - v,
+    v = d - d_0 - t_1 s + t_2 t,      v_k = 0 where |w| <= mu N, else T = mu N w / |w|,      w = T - c v,
 
-where ``d_0`` and ``t`` are the vector and the tangents there in the last state.  Where ``T`` opposes ``v`` the second
-is Coulomb's law.  That the place is the nearest one then is ``N n . t = 0``, without what friction does along members.
+where ``d_0`` and ``t`` are the vector and the tangents there in the last state: Coulomb's law, whatever the number
+``c > 0``, which Newton's method alone depends on.  The force along the members has no part in where the nearest place
+is, ``N n . t = 0``.
 
 Source: Konyukhov and Izadi 2015, Introduction to Computational Contact Mechanics, chapter 11 (contact of curves);
 Alart and Curnier 1991 (friction as an equation).
@@ -146,8 +147,9 @@ class Gap(Term):
 class Rough(Term):
     """Contact with friction at a point.
 
-    Places: the vector, the forces, the places on the members.  Data: of the gap, the coefficient, directions along, the
-    vector of the last state less that where the search begins, tangents of the members in the last state, and now.
+    Places: the vector, the forces, the places on the members.  Data: of the gap, the coefficient, how firm it is,
+    directions along, the vector of the last state less that where the search begins, tangents of the members in the
+    last state, and now.
 
     Attributes
     ----------
@@ -155,13 +157,10 @@ class Rough(Term):
         The gap.
     members : int
         Two, or one on an obstacle.
-    sticks : bool
-        Whether it does, or slides.
     """
 
     smooth: Gap
     members: int
-    sticks: bool
 
     table: ClassVar[str] = "contacts"
     answers: ClassVar[Mapping[str, str]] = {
@@ -178,11 +177,11 @@ class Rough(Term):
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """Its places; no rows."""
-        return 0, 2 + self.members, 0, self.smooth.sizes[3] + 1 + self.axes * (self.axes + 2 * self.members), 0
+        return 0, 2 + self.members, 0, self.smooth.sizes[3] + 2 + self.axes * (self.axes + 2 * self.members), 0
 
     def _parts(self, u: list[Side], data: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, list[ca.SX]]:
         """The gap, its normal, friction (axes,), the slip (axes,), and the tangents of the members."""
-        n, own = self.axes, data[self.smooth.sizes[3] + 1 :]
+        n, own = self.axes, data[self.smooth.sizes[3] + 2 :]
         vectors = ca.vertsplit(own, n)
         frame, origin, tangents = vectors[: n - 1], vectors[n - 1], vectors[n:]
         vector = ca.SX.sym("vector", n)
@@ -199,18 +198,22 @@ class Rough(Term):
     def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """On the vector minus the force of the point; on the forces what they miss; along the members."""
         gap, normal, friction, slip, tangents = self._parts(u, data)
-        coefficient, n = data[self.smooth.sizes[3]], self.axes
-        frame = ca.vertsplit(data[self.smooth.sizes[3] + 1 :], n)[: n - 1]
-        if self.sticks:
-            missing = [-ca.dot(slip, way) - YIELDING * share for way, share in zip(frame, u[1][1:], strict=True)]
-        else:
-            way = friction - slip
-            way = coefficient * u[1][0] * way / ca.sqrt(ca.dot(way, way) + NOWHERE)
-            missing = [share - ca.dot(way, along) for share, along in zip(u[1][1:], frame, strict=True)]
+        first, n = self.smooth.sizes[3], self.axes
+        coefficient, firm = ca.vertsplit(data[first : first + 2])
+        frame = ca.vertsplit(data[first + 2 :], n)[: n - 1]
+        # The nearest force to w that Coulomb's law allows.
+        way, limit = friction - firm * slip, coefficient * ca.fmax(u[1][0], 0.0)
+        size = ca.sqrt(ca.dot(way, way) + NOWHERE)
+        # What is new sticks: how hard it pushes is not known yet.
+        held = ca.logic_or(size <= limit, firm <= 0.0)
+        missing = []
+        for share, along in zip(u[1][1:], frame, strict=True):
+            sticking = -ca.dot(slip, along) - YIELDING * share
+            missing.append(ca.if_else(held, sticking, share - limit * ca.dot(way, along) / size))
         nothing = [ca.SX(0)] * (n - 1)
         pairs = zip(tangents, (1.0, -1.0), strict=False)
-        along = [part for tangent, sign in pairs for part in (sign * ca.dot(friction, tangent), *nothing)]
-        return [*ca.vertsplit(-u[1][0] * normal - friction), -gap - YIELDING * u[1][0], *missing, *along]
+        slides = [part for tangent, sign in pairs for part in (sign * ca.dot(friction, tangent), *nothing)]
+        return [*ca.vertsplit(-u[1][0] * normal - friction), -gap - YIELDING * u[1][0], *missing, *slides]
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """The force across, friction (3,) on the first member, and how far that has slipped (3,)."""
@@ -263,9 +266,9 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
         origin = (np.array(grip.origin) - begin)[:axes] / unit
         further = [np.array(one)[:axes] for one in (*grip.before, *grip.now)]
         frame = [np.array(one)[:axes] for one in grip.frame]
-        data = np.concatenate([data, [grip.coefficient], *frame, origin, *further])
+        data = np.concatenate([data, [grip.coefficient, grip.firm], *frame, origin, *further])
         places = (between, segments.place(point.pressed), *slides)
-        yield One(Rough(space, gap, len(point.members), grip.sticks), point.name, "", numbers(data), (), places)
+        yield One(Rough(space, gap, len(point.members)), point.name, "", numbers(data), (), places)
 
 
 def _gap(scene: Scene, point: ContactPoint, space: bool) -> tuple[Gap, list[Array]]:

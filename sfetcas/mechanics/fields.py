@@ -50,6 +50,9 @@ LARGE = 1.0
 MEMBERS = 64
 """Number of members whose intermediate results are cached, since reports ask for one member after the other."""
 
+SLIDES = 1e-6
+"""Share of the limit of friction by which friction is below it where what touches is said to stick."""
+
 
 class Fields:
     """Evaluates a state of a model.
@@ -162,10 +165,11 @@ class Fields:
         moved = (found["moved on first"], found["moved on second"])
         at = tuple(a + s / lines[m].length for a, s, m in zip(point.at, moved, point.members, strict=False))
         force = np.array([found[f"force {axis}"] for axis in "xyz"])
-        answer = {"at": at, "force": force, "push": found["push"]}
+        answer: dict[str, Any] = {"at": at, "force": force, "push": found["push"]}
         if point.grip is not None:
             answer |= {key: np.array([found[f"{key} {axis}"] for axis in "xyz"]) for key in ("friction", "slip")}
-            answer["sticks"] = point.grip.sticks
+            limit = point.grip.coefficient * found["push"]
+            answer["sticks"] = bool(np.linalg.norm(answer["friction"]) < limit * (1.0 - SLIDES))
         return answer
 
     @functools.cached_property

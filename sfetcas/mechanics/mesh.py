@@ -21,8 +21,8 @@ from .carried import carried, magnetic, natural_turning
 
 __all__ = [
     "ContactPoint",
-    "Grip",
     "Cushion",
+    "Grip",
     "Mesh",
     "Remembered",
     "Spot",
@@ -86,8 +86,8 @@ class Grip:
     ----------
     coefficient : float
         Coulomb's.
-    sticks : bool
-        Whether the places that touch stay together; else they slide.
+    firm : float
+        Force over slip, dimensionless, of :mod:`~sfetcas.mechanics.contact_points`; zero where it sticks anyhow.
     frame : tuple of vectors
         Directions across the normal, one in the plane and two in space.
     origin : vector
@@ -102,7 +102,7 @@ class Grip:
     """
 
     coefficient: float
-    sticks: bool
+    firm: float
     frame: tuple[Vector, ...]
     origin: Vector
     before: tuple[Vector, ...]

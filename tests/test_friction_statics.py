@@ -1,0 +1,173 @@
+"""Coulomb friction where members touch, in statics along the order of the steps."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from sfetcas import Scene, SceneError, SolveError, solve
+
+FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}
+TIP_FLOOR = {"type": "plane", "point": [0, -0.3], "normal": [0, 1], "members": "all"}
+
+
+def block(friction, pull, *, steps=(1.0,), spring=True, turned=0.0, space=False):
+    """A bar that lies on a floor with its weight at its ends, held by a spring and pulled along the floor."""
+
+    def at(x, y, z):
+        vector = np.array([np.cos(turned) * x - np.sin(turned) * y, np.sin(turned) * x + np.cos(turned) * y, z])
+        return vector.tolist() if space else [x, z]
+
+    table = {
+        "nodes": {"A": {"position": at(0, 0, 0)}, "B": {"position": at(1, 0, 0)}},
+        "members": {"bar": {"nodes": ["A", "B"], "type": "rigid"}},
+        "loads": {
+            "a": {"type": "force", "node": "A", "value": at(0, 0, -1), "history": "weight"},
+            "b": {"type": "force", "node": "B", "value": at(0, 0, -1), "history": "weight"},
+            "pull": {"type": "force", "node": "B", "value": at(pull, 0, 0)},
+        },
+        "histories": {"weight": {"t": [0], "value": [1]}},
+        "contacts": {"floor": FLOOR | {"point": at(0, 0, 0), "normal": at(0, 0, 1), "friction": friction}},
+        "analysis": {"accuracy": 1e-6, "steps": list(steps)},
+    }
+    if spring:
+        table["springs"] = {"k": {"type": "translational", "node": "A", "stiffness": 10.0}}
+    if space:
+        # What bars on their ends do not hold: a second one across.
+        table["nodes"]["C"] = {"position": at(0, 1, 0)}
+        table["members"]["across"] = {"nodes": ["A", "C"], "type": "rigid"}
+        table["loads"]["c"] = {"type": "force", "node": "C", "value": at(0, 0, -1), "history": "weight"}
+    return Scene.from_dict(table)
+
+
+def test_block_goes_out_stays_and_comes_back_as_far_as_friction_lets_it():
+    """Pulled by 2 N against 0.6 N of friction and 10 N/m; let go it stays, then the spring draws it back."""
+    steps = solve(block(0.3, 2.0, steps=(1.0, 0.5, 0.0))).steps
+    # What is rough gives way by 1e-9.
+    assert [step.position("A")[0] for step in steps] == pytest.approx([0.14, 0.14, 0.06], abs=1e-9)
+    floors = [step.contacts["floor"] for step in steps]
+    assert [floor["friction"][0] for floor in floors] == pytest.approx([-0.6, 0.4, 0.6], abs=1e-7)
+    assert [floor["sticking"] for floor in floors] == [False, True, False]
+    assert steps[0].certificate.stable == "not defined"
+    assert any("order of the steps" in note for note in steps[0].notes)
+
+
+def test_how_far_a_force_can_go_before_what_it_pulls_slips_is_told():
+    """Nothing but friction holds it: 0.6 of 1 N."""
+    with pytest.raises(SolveError, match=r"where all that touches is about to slide: contacts\.floor") as told:
+        solve(block(0.3, 1.0, spring=False))
+    # Steps are halved to 2^-14 of the way.
+    reached = float(str(told.value).split("followed to the factor ")[1].split(",")[0])
+    assert reached == pytest.approx(0.6, abs=2e-4)
+
+
+def test_friction_does_not_depend_on_the_axes():
+    """In space, pulled so that it turns as it slides: friction at each foot is at its limit, in any direction."""
+    straight, turned = (solve(block(0.3, 2.0, turned=angle, space=True)).last for angle in (0.0, 0.7))
+    c, s = np.cos(0.7), np.sin(0.7)
+    there = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ straight.position("B")
+    # The same steps on the same mesh: rounding, and what is rough gives way by 1e-9.
+    np.testing.assert_allclose(turned.position("B"), there, atol=1e-8)
+    for step in (straight, turned):
+        found = step.contacts["floor"]
+        alone = found["at"].index(1.0)
+        assert np.linalg.norm(found["friction"][alone]) == pytest.approx(0.3 * found["force"][alone][2], rel=1e-6)
+        assert np.sum(found["force"], axis=0)[2] == pytest.approx(3.0, abs=1e-8)
+
+
+def cantilever(load, contact=None, **more):
+    """A cantilever of unit length with a force at its end."""
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"beam": {"nodes": ["A", "B"], "section": "s"}},
+        "loads": {"F": {"type": "force", "node": "B", "value": list(load)}},
+        "contacts": {"c": contact} if contact else {},
+        "analysis": {"accuracy": 1e-5},
+    }
+    return Scene.from_dict(table | more)
+
+
+def test_tip_that_sticks_stays_where_it_touched():
+    """As if it were hinged there: the loads until it touches, and the hinge, without any contact."""
+    load = np.array([1.0, -3.0])
+    fine = {"analysis": {"accuracy": 1e-9}}
+
+    def below(factor):
+        return solve(cantilever(factor * load, **fine)).last.position("B")[1] + 0.3
+
+    touching = solve(cantilever(brentq(below, 0.2, 0.9, xtol=1e-11) * load, **fine)).last.position("B")
+    nodes = {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0], "support": "hinge"}}
+    moved = {"m": {"node": "B", "displacement": [touching[0] - 1.0, -0.3]}}
+    held = solve(cantilever(load, nodes=nodes, motions=moved, **fine)).last
+    step = solve(cantilever(load, TIP_FLOOR | {"friction": 2.0})).last
+    floor = step.contacts["c"]
+    assert floor["sticking"] is True
+    np.testing.assert_allclose(step.position("B"), touching, atol=1e-5)
+    # Along the beam it is 2,000 times as stiff: what positions may err by, times that.
+    np.testing.assert_allclose(floor["force"], held.reaction("B")[0], atol=2e-2)
+    assert abs(held.reaction("B")[0][0]) > 0.5
+
+
+def test_tip_that_slides_is_pulled_by_its_friction():
+    """The same as a smooth floor and the friction as a load, by the code of contact without friction."""
+    step = solve(cantilever((1.0, -3.0), TIP_FLOOR | {"friction": 0.1})).last
+    floor = step.contacts["c"]
+    assert floor["sticking"] is False
+    assert np.abs(floor["friction"][0]) == pytest.approx(0.1 * floor["force"][1], rel=1e-9)
+    smooth = solve(cantilever(np.array([1.0, -3.0]) + floor["friction"][:2], TIP_FLOOR)).last
+    np.testing.assert_allclose(step.position("B"), smooth.position("B"), atol=1e-5)
+    assert floor["force"][1] == pytest.approx(smooth.contacts["c"]["force"][1], abs=2e-2)
+
+
+def test_friction_on_a_round_member_is_that_on_a_round_obstacle():
+    """A cantilever is pressed on a drum, which is an obstacle, or a rigid rod that nothing moves in space."""
+    space = {"sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0}}, "analysis": {"accuracy": 1e-4}}
+    drum = {"type": "cylinder", "center": [0.6, 0, -0.3], "axis": [0, 1, 0], "radius": 0.15, "member_radius": 0.05}
+    nodes = {
+        "A": {"position": [0, 0, 0], "support": "clamped"},
+        "B": {"position": [1, 0, 0]},
+    }
+    load = {"F": {"type": "force", "node": "B", "value": [0, 0, -4]}}
+    on_drum = solve(
+        cantilever((0, 0), drum | {"members": ["beam"], "friction": 0.2}, nodes=nodes, loads=load, **space)
+    ).last
+    rod = {
+        "r0": {"position": [0.6, -1, -0.3], "support": "clamped"},
+        "r1": {"position": [0.6, 1, -0.3], "support": "clamped"},
+    }
+    members = {
+        "beam": {"nodes": ["A", "B"], "section": "s"},
+        "rod": {"nodes": ["r0", "r1"], "type": "rigid"},
+    }
+    pair = {"type": "members", "members": ["beam", "rod"], "radius": 0.1, "friction": 0.2}
+    on_rod = solve(cantilever((0, 0), pair, nodes=nodes | rod, members=members, loads=load, **space)).last
+    np.testing.assert_allclose(on_rod.position("B"), on_drum.position("B"), atol=1e-4)
+    one, other = on_drum.contacts["c"], on_rod.contacts["c"]
+    np.testing.assert_allclose(np.abs(other["friction"]), np.abs(one["friction"]), atol=2e-2)
+    assert np.linalg.norm(one["friction"]) > 0.1
+    assert one["sticking"] == other["sticking"]
+
+
+def test_without_friction_nothing_is_rough():
+    smooth, rough = (solve(cantilever((0.0, -3.0), TIP_FLOOR | more)).last for more in ({}, {"friction": 1e-9}))
+    # What is left of 1e-9 of the force.
+    np.testing.assert_allclose(rough.position("B"), smooth.position("B"), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        ({"friction": -0.1}, "zero or above"),
+        ({"friction": "some"}, "friction"),
+        ({"friction": float("nan")}, "friction"),
+    ],
+)
+def test_wrong_input_is_told_in_one_sentence(more, sentence):
+    with pytest.raises(SceneError, match=sentence) as told:
+        cantilever((0, -3), TIP_FLOOR | more)
+    assert "\n" not in str(told.value)
+
+
+def test_analyses_that_have_no_order_are_refused():
+    with pytest.raises(SceneError, match=r"found friction with analysis\.type = 'path', accepted"):
+        cantilever((0, -3), TIP_FLOOR | {"friction": 0.1}, analysis={"type": "path", "range": [0, 1]})
