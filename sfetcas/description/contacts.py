@@ -1,4 +1,4 @@
-"""Frictionless contact: of members with obstacles, points, lines, planes, circles, cylinders and spheres, and of
+"""Contact: of members with obstacles, points, lines, planes, circles, cylinders and spheres, and of
 members with each other.
 """
 
@@ -41,6 +41,12 @@ def _side(value: Any) -> Any:
     return value
 
 
+def _coefficient(value: float) -> float:
+    if value < 0.0:
+        raise ValueError(f"found {value:g}, accepted: a coefficient of friction, not below zero")
+    return value
+
+
 def _share(value: float) -> float:
     if not 0.0 <= value <= 1.0:
         raise ValueError(f"found {value:g}, accepted: a share of the speed before, from 0 to 1")
@@ -48,7 +54,7 @@ def _share(value: float) -> float:
 
 
 class Contact(Record):
-    """A frictionless obstacle, or members that touch each other; forces push members apart and never hold them.
+    """An obstacle, or members that touch each other; forces push members apart and never hold them.
 
     Parameters
     ----------
@@ -78,6 +84,8 @@ class Contact(Record):
         ``"outside"``.  Default: of what is round the outside.
     restitution : 1
         Speed across the obstacle after an impact over that before, from 0 to 1; of motions alone.
+    friction : 1
+        Coulomb's coefficient: the largest force along the obstacle over that across it; of motions alone.
     """
 
     type: Literal["point", "line", "plane", "circle", "cylinder", "sphere", "members"]
@@ -92,6 +100,7 @@ class Contact(Record):
     members: Annotated[tuple[str, ...] | Literal["all"], BeforeValidator(_members)] | None = None
     side: Annotated[Direction | Literal["inside", "outside"], BeforeValidator(_side)] | None = None
     restitution: Annotated[float, BeforeValidator(number), AfterValidator(_share)] = 0.0
+    friction: Annotated[float, BeforeValidator(number), AfterValidator(_coefficient)] = 0.0
 
     @model_validator(mode="after")
     def _check(self) -> Contact:
@@ -99,7 +108,7 @@ class Contact(Record):
         given = {key for key in self.model_fields_set if getattr(self, key) is not None}
         for key in sorted(needed - given):
             raise SceneError(f"the key {key!r} is missing: a {self.type} needs {' and '.join(sorted(needed))}")
-        for key in sorted(given - needed - possible - {"type", "member", "members", "restitution"}):
+        for key in sorted(given - needed - possible - {"type", "member", "members", "restitution", "friction"}):
             what = "members touch each other" if self.between_members else f"the obstacle is a {self.type}"
             raise SceneError(f"not accepted: {what}", (key,))
         if (self.member is None) == (self.members is None):

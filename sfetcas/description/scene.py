@@ -994,6 +994,19 @@ def _check_contacts(scene: Scene) -> None:
                 raise SceneError(f"member {member!r} {error}", ("contacts", name)) from None
 
 
+def _check_friction(scene: Scene) -> None:
+    """Refuse friction of contact but with obstacles in motions."""
+    for name, contact in scene.contacts.items():
+        if not contact.friction:
+            continue
+        where = ("contacts", name, "friction")
+        if contact.between_members:
+            raise SceneError(f"found {contact.friction:g} between members, accepted: 0, as they touch without", where)
+        if scene.analysis.type != "dynamic":
+            found = f"found {contact.friction:g} with analysis.type = {scene.analysis.type!r}"
+            raise SceneError(f"{found}, accepted: 0, or 'dynamic'", where)
+
+
 def _check_between_members(scene: Scene, name: str) -> None:
     """Refuse contact between members whose surfaces are not known, or that no search is for."""
     contact, where = scene.contacts[name], ("contacts", name)
@@ -1149,6 +1162,7 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_motions,
     _check_supports,
     _check_moving,
+    _check_friction,
     _check_contacts,
     check_memory,
     check_insertion,
