@@ -39,7 +39,7 @@ from ..mathematics.arrays import Array
 from ..mathematics.interpolation import evaluation
 from ..mechanics.equations import State
 from ..mechanics.rubbing import STILL, Rubs
-from .impacts import Impacts
+from .impacts import Collision, Impacts
 from .integrating import SHORTEST, Memory, Passed, Stepper, Taken
 from .sampling import turned_by
 
@@ -154,6 +154,9 @@ class Events:
         if not known:
             return None
         share = min(known)
+        if share == 1.0 and halted == 1.0:
+            nothing = np.zeros(len(self.rows), bool)
+            return Passed([taken], self._after(taken.after, nothing, nothing, taken.h))
         if (together := self._together(taken, share)) is not None:
             return together
         self._refuse_endless(taken.begin)
@@ -346,7 +349,7 @@ class Events:
         """What friction could be more of what sticks (m,), infinite of others, and what it is (m, axes)."""
         if self._rubbing is None or memory.rubs is None:
             return np.zeros(0), np.zeros((0, 0))
-        friction = -np.einsum("mka,mk->ma", memory.rubs.frames, lam[self._rubbing.rows])
+        friction = -np.einsum("mka,mk->ma", memory.rubs.frames, lam[self._rubbing.rows] * memory.rubs.holds)
         most = -self._rubbing.coefficients * lam[self._rubbing.gaps]
         spare = (1.0 + GAP) * most - np.linalg.norm(friction, axis=1)
         return np.where(memory.rubs.sticks > 0.0, spare, np.inf), friction
@@ -363,9 +366,18 @@ class Events:
         return float(self._speeds(memory).min(initial=np.inf))
 
     def _halted(self, taken: Taken) -> float | None:
-        """Share of a step after which the first place that slides stands still; None where none does."""
-        if taken.begin.rubs is None or not taken.begin.rubs.slides.any() or self._speed(taken.after) >= -BACK:
+        """Share of a step after which the first place that slides stands still; None where none does.
+
+        All of it where one has come to rest without that, or has drifted that no row held.
+        """
+        rubs = taken.begin.rubs
+        if rubs is None or self._rubbing is None:
             return None
+        if not rubs.slides.any() or self._speed(taken.after) >= -BACK:
+            # Held by what else sticks it may come to rest little by little.
+            ebbs = (self._speeds(taken.begin) > STILL) & (self._speeds(taken.after) <= STILL)
+            drifts = rubs.drifted(self._rubbing.displacements(taken.after.y)) > DRIFTED
+            return 1.0 if drifts or ebbs.any() else None
 
         # What begins to slide has no speed yet.
         begun = BACK if self._speed(taken.begin) <= BACK else 0.0
@@ -373,7 +385,29 @@ class Events:
         def left(share: float) -> float:
             return self._speed(self._at(taken, share)) + begun
 
-        return _root(left, 0.0, 1.0, XTOL) if left(0.0) > 0.0 else 0.0
+        if left(0.0) <= 0.0:
+            return 0.0
+        try:
+            return _root(left, 0.0, 1.0, XTOL)
+        except SolveError:
+            return self._halting(taken)
+
+    def _halting(self, taken: Taken) -> float:
+        """As :meth:`_halted`, where steps end so near to rest that the direction of sliding swings round too fast for them.
+
+        What begins there is slower, and has shorter steps.
+        """
+        low, high = 0.0, 1.0
+        while high - low > XTOL:
+            share = 0.5 * (low + high)
+            try:
+                speed = self._speed(self._at(taken, share))
+            except SolveError:
+                speed = -np.inf
+            low, high = (share, high) if speed > 0.0 else (low, share)
+            if 0.0 < speed <= STILL:
+                break
+        return low
 
     # -- states ---------------------------------------------------------------------------------------
 
@@ -430,12 +464,13 @@ class Events:
             _, friction = self._spare(memory, memory.lam)
             size = np.maximum(np.linalg.norm(friction, axis=1, keepdims=True), 1e-300)
             ways = np.where(slips[:, None], -friction / size, ways)
-        # What has stuck so far stays where it is.
-        stays, fresh = still & (rubs.sticks > 0.0), rubbing.idle(u)
+        # What has been held so far stays where it is.
+        stays, fresh = still & (rubs.holds.all(axis=1)), rubbing.idle(u)
         frames = np.where(stays[:, None, None], rubs.frames, fresh.frames)
         held = np.where(stays[:, None], rubs.held, fresh.held)
         sticks = still if slips is None else still & ~slips
-        found = Rubs(sticks.astype(float), (touches & ~sticks).astype(float), ways, frames, held)
+        slides = (touches & ~sticks).astype(float)
+        found = Rubs(sticks.astype(float), slides, 0.0 * held, ways, frames, held)
         return replace(memory, rates=_with_velocity(memory.rates, velocity), rubs=found), still
 
     def _settled(
@@ -447,8 +482,10 @@ class Events:
         """
         if not touching.any():
             return acting, np.zeros(len(memory.lam)), memory.rubs
+        collision = None
         if memory.rubs is not None:
             acting, touching = np.append(acting, memory.rubs.sticks > 0.0), np.append(touching, still)
+            collision = self._impacts.at(memory)
         # Where it did not hold at this time in a longer step, a shorter one is asked.
         h = max(self._length(h) * SHORTER**self._again, SHORTEST / SHORTER)
         best, least = acting, len(acting) + 1
@@ -457,7 +494,7 @@ class Events:
             now, fewest, patience = acting, len(acting) + 1, PATIENCE
             while now.tobytes() not in tried and len(tried) < TRIED * int(touching.sum()) + TRIED:
                 tried.add(now.tobytes())
-                wrong, lam, memory = self._tried(memory, now, touching, h)
+                wrong, lam, memory = self._tried(memory, now, touching, h, collision)
                 if lam is not None:
                     return now[: len(self.rows)], lam, memory.rubs
                 # All that is wrong is changed at once while less is wrong from time to time, then one row at a time.
@@ -469,7 +506,7 @@ class Events:
             for choice in _choices(touching):
                 if choice.tobytes() in tried:
                     continue
-                _, lam, memory = self._tried(memory, choice, touching, h)
+                _, lam, memory = self._tried(memory, choice, touching, h, collision)
                 if lam is not None:
                     return choice[: len(self.rows)], lam, memory.rubs
             # Waves that are shorter than the step make what is true at once untrue a little later.
@@ -477,31 +514,31 @@ class Events:
         rows = touching[: len(self.rows)]
         if self._of_obstacles[rows].any():
             # Waves through places side by side: what is wrong is an event at once.
-            chosen, rubs = self._chosen(memory, best)
+            chosen, rubs = self._chosen(memory, best, collision)
             return chosen, np.zeros(len(memory.lam)), rubs
         seconds = memory.t * self.stepper.time
         names = ", ".join(np.array(self.system.unilateral.names)[rows].tolist())
         raise SolveError(Status.STOPPED, f"at {seconds:.9g} s no choice of what acts holds, of {names}", memory)
 
-    def _chosen(self, memory: Memory, choice: Array) -> tuple[Array, Rubs | None]:
+    def _chosen(self, memory: Memory, choice: Array, collision: Collision | None) -> tuple[Array, Rubs | None]:
         """The rows (rows,) that act in a choice, of bool, and what sticks and slides."""
         acting, sticks = choice[: len(self.rows)], choice[len(self.rows) :]
-        if memory.rubs is None:
+        if memory.rubs is None or collision is None or self._rubbing is None:
             return acting, None
         pushed = acting[self._rough]
-        return acting, replace(
-            memory.rubs, sticks=(pushed & sticks).astype(float), slides=(pushed & ~sticks).astype(float)
-        )
+        sticks, slides = pushed & sticks, (pushed & ~sticks).astype(float)
+        holds = collision.independent(acting, sticks, -memory.lam[self._rubbing.gaps])
+        return acting, replace(memory.rubs, sticks=sticks.astype(float), slides=slides, holds=holds)
 
     def _tried(
-        self, memory: Memory, choice: Array, touching: Array, h: float
+        self, memory: Memory, choice: Array, touching: Array, h: float, collision: Collision | None
     ) -> tuple[Array, Array | None, Memory]:
         """What (rows + m,) a choice of rows that act and places that stick has wrong.
 
         Also all multipliers where there is nothing, and the state with the choice and the ways in which places would
         slide.
         """
-        acting, rubs = self._chosen(memory, choice)
+        acting, rubs = self._chosen(memory, choice, collision)
         memory = replace(memory, acting=acting.astype(float), rubs=rubs)
         soon = self._soon(memory, h)
         wrong = np.where(acting, soon.forces < -soon.rounding, touching[: len(acting)] & (soon.opened < -ROUNDING))
@@ -517,7 +554,7 @@ class Events:
         lam = np.zeros(len(memory.lam))
         lam[self.rows] = self.signs * np.where(acting, soon.forces, 0.0)
         if rubs is not None and self._rubbing is not None:
-            lam[self._rubbing.rows] = -np.einsum("mka,ma->mk", rubs.frames, soon.friction) * rubs.sticks[:, None]
+            lam[self._rubbing.rows] = -np.einsum("mka,ma->mk", rubs.frames, soon.friction) * rubs.holds
         return wrong, lam, memory
 
     def _consistent(self, memory: Memory) -> Memory:
@@ -630,6 +667,9 @@ ROUNDED, RELATIVE = 10.0, 1e-9
 
 GAP = 1e-6
 """Share by which friction may be larger than it can before what sticks slides: beyond what rounding decides."""
+
+DRIFTED = 1e-7
+"""Unit of length by which what sticks may move, where what it is connected with seemed to hold it."""
 
 BACK = 1e-8
 """Speed against the direction of sliding, dimensionless, at which what slides has come to rest."""

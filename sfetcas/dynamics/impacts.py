@@ -114,6 +114,26 @@ class Collision:
         """The nearest velocities (quantities,) that acting rows (rows,) and places that stick (m,), of bool, allow."""
         return self._velocities(self._allowed(acting, still))
 
+    def independent(self, acting: Array, sticks: Array, pushes: Array) -> Array:
+        """Which rows (m, axes - 1), 1 or 0, hold places that stick, none of which follows from others.
+
+        ``acting`` (rows,) and ``sticks`` (m,) are of bool; the rows of places with the largest ``pushes`` (m,) come first.
+        """
+        assert self._rubbing is not None
+        jacobian = self._jacobian / np.maximum(np.linalg.norm(self._jacobian, axis=1), TINY)[:, None]
+        held = np.linalg.svd(jacobian[np.concatenate([self._always, self._rows[acting]])], full_matrices=False)
+        known = list(held[2][held[1] > DEPENDENT])
+        found = np.zeros(self._rubbing.rows.shape)
+        for k in sorted(np.flatnonzero(sticks).tolist(), key=lambda k: -pushes[k]):
+            for i, row in enumerate(self._rubbing.rows[k].tolist()):
+                rest = jacobian[row]
+                for _ in range(2):
+                    rest = rest - sum((one * (one @ rest) for one in known), np.zeros(len(rest)))
+                if (size := float(np.linalg.norm(rest))) > DEPENDENT:
+                    known.append(rest / size)
+                    found[k, i] = 1.0
+        return found
+
     def _velocities(self, w: Array) -> Array:
         """Velocities (quantities,) for those of the unknowns in their units."""
         return self._system.rates_in_time(self._state, self._factors, w * self._unit, self._faster)[1]
@@ -239,6 +259,9 @@ LIGHT, MASSLESS, TINY = 1e-6, 1e-12, 1e-300
 """Share of the largest mass below which an unknown keeps it in its unit, and of a unit that counts as no mass; and what
 is divided by instead of zero.
 """
+
+DEPENDENT = 1e-6
+"""Length of what of a row's gradient, of length one, does not follow from others, up to which it follows from them."""
 
 DUAL, REFINED = 1e-12, 3
 """Diagonal of the rows, whose gradients are of length one, and rounds in which what it does is taken out again."""

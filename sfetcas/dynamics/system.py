@@ -187,8 +187,7 @@ class System(Expressions):
         acting = self.acting(unwrapped)
         if self.rubbing is None:
             return acting
-        sticks = self.rubbing.parts(self.rubs(unwrapped))[1]
-        return ca.vertcat(acting, ca.vec(ca.repmat(sticks.T, self.axes - 1, 1)))
+        return ca.vertcat(acting, self.rubbing.parts(self.rubs(unwrapped))[1])
 
     def switched(self, rows: ca.MX, unwrapped: ca.MX) -> ca.MX:
         """Multipliers of the rows (rows,), zero where a unilateral constraint does not act."""

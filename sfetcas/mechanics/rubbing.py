@@ -42,6 +42,9 @@ class Rubs:
     ----------
     sticks, slides : ndarray (m,)
         1 or 0.
+    holds : ndarray (m, axes - 1)
+        Which rows hold those that stick, 1 or 0: not those that follow from others, as the second of two places on a
+        rigid body, whose friction would be open.
     ways : ndarray (m, axes)
         Unit vectors in the direction of sliding, or of the last one.
     frames : ndarray (m, axes - 1, axes)
@@ -52,6 +55,7 @@ class Rubs:
 
     sticks: Array
     slides: Array
+    holds: Array
     ways: Array
     frames: Array
     held: Array
@@ -60,7 +64,12 @@ class Rubs:
     def flat(self) -> Array:
         """All of it as one vector, as :meth:`Rubbing.parts` takes it apart."""
         told = np.concatenate([self.frames, self.held[:, :, None]], axis=2)
-        return np.concatenate([self.slides, self.sticks, self.ways.ravel(), told.ravel()])
+        return np.concatenate([self.slides, self.holds.ravel(), self.ways.ravel(), told.ravel()])
+
+    def drifted(self, u: Array) -> float:
+        """How far displacements (m, axes) are at most from those that places keep that stick."""
+        missed = np.einsum("mka,ma->mk", self.frames, u) - self.held
+        return float(np.abs(missed * self.sticks[:, None]).max(initial=0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +131,7 @@ class Rubbing:
     @property
     def size(self) -> int:
         """Numbers that tell what they do, see :attr:`Rubs.flat`."""
-        return len(self) * (2 + self.axes + self.told)
+        return len(self) * (2 * self.axes + self.told)
 
     @property
     def told(self) -> int:
@@ -130,10 +139,10 @@ class Rubbing:
         return (self.axes - 1) * (self.axes + 1)
 
     def parts(self, flat: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
-        """Of :attr:`Rubs.flat` ``slides`` and ``sticks`` (m,), ``ways`` (axes, m), and what is told (told, m)."""
+        """Of :attr:`Rubs.flat` ``slides`` (m,), ``holds`` (m * (axes - 1),), ``ways`` (axes, m), what is told (told, m)."""
         m = len(self)
-        slides, sticks, ways, told = ca.vertsplit(flat, [0, m, 2 * m, (2 + self.axes) * m, self.size])
-        return slides, sticks, ca.reshape(ways, self.axes, m), ca.reshape(told, self.told, m)
+        slides, holds, ways, told = ca.vertsplit(flat, [0, m, self.axes * m, 2 * self.axes * m, self.size])
+        return slides, holds, ca.reshape(ways, self.axes, m), ca.reshape(told, self.told, m)
 
     # -- numbers ----------------------------------------------------------------------------------------
 
@@ -162,7 +171,7 @@ class Rubbing:
         frames = np.array([directions_along(normal) for normal in self.normals(u)])
         held = np.einsum("mka,ma->mk", frames, u)
         nothing = np.zeros(len(self))
-        return Rubs(nothing, nothing, frames[:, 0].copy(), frames, held)
+        return Rubs(nothing, nothing, 0.0 * held, frames[:, 0].copy(), frames, held)
 
     def directions(self, u: Array, velocities: Array, ways: Array) -> tuple[Array, Array]:
         """Directions of sliding (m, axes), and the speeds (m,) along the ways: below zero beyond the end of sliding."""
