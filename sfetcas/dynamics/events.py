@@ -324,7 +324,9 @@ class Events:
         at_stages = (self.signs * taken.lam[:, self.rows])[:, acting]
         before = (self.signs * begin.lam[self.rows])[acting]
         if begin.rubs is not None:
-            spare = np.array([self._spare(begin, lam)[0] for lam in (*taken.lam, begin.lam)])[:, begin.rubs.sticks > 0.0]
+            spare = np.array([self._spare(begin, lam)[0] for lam in (*taken.lam, begin.lam)])[
+                :, begin.rubs.sticks > 0.0
+            ]
             at_stages, before = np.hstack([at_stages, spare[:-1]]), np.append(before, spare[-1])
         # Forces of stages are not as accurate as what decides: it is asked for also where they only come near to zero.
         doubtful = [
@@ -394,7 +396,7 @@ class Events:
             return self._halting(taken)
 
     def _halting(self, taken: Taken) -> float:
-        """As :meth:`_halted`, where steps end so near to rest that the direction of sliding swings round too fast for them.
+        """As :meth:`_halted`, where the direction of sliding swings round too fast beside rest for steps to end there.
 
         What begins there is slower, and has shorter steps.
         """
@@ -554,7 +556,9 @@ class Events:
             wrong = np.concatenate([wrong, slips | back])
             # What does not hold slides against the friction that would.
             size = np.maximum(np.linalg.norm(soon.friction, axis=1, keepdims=True), 1e-300)
-            memory = replace(memory, rubs=replace(rubs, ways=np.where(slips[:, None], -soon.friction / size, rubs.ways)))
+            memory = replace(
+                memory, rubs=replace(rubs, ways=np.where(slips[:, None], -soon.friction / size, rubs.ways))
+            )
         if wrong.any():
             return wrong, None, memory
         lam = np.zeros(len(memory.lam))

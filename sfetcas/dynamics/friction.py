@@ -1,7 +1,7 @@
 """Forces along obstacles at an instant of a motion, from the balance of all forces.
 
-Of what sticks they are unknown; of what slides they are the coefficient times the push of the obstacle, which depends on
-them in turn.  Multipliers are linear in these forces, and so is what is left out of balance, in least squares.
+Of what sticks they are unknown; of what slides they are the coefficient times the push of the obstacle, which depends
+on them in turn.  Multipliers are linear in these forces, and so is what is left out of balance, in least squares.
 """
 
 from __future__ import annotations

@@ -91,7 +91,7 @@ class Collision:
         return np.setdiff1d(np.arange(len(self._jacobian)), self._system.switching)
 
     def _allowed(self, before: Array, still: Array | None = None) -> Array:
-        """The nearest velocities (unknowns,) under which no row opens or closes that acts, and nothing moves that sticks.
+        """The nearest velocities (unknowns,) at which no row opens or closes that acts, and nothing moves that sticks.
 
         ``still`` (m,) of bool are the places that stick; by default those that do in the state.
         """
@@ -117,7 +117,7 @@ class Collision:
     def independent(self, acting: Array, sticks: Array, pushes: Array) -> Array:
         """Which rows (m, axes - 1), 1 or 0, hold places that stick, none of which follows from others.
 
-        ``acting`` (rows,) and ``sticks`` (m,) are of bool; the rows of places with the largest ``pushes`` (m,) come first.
+        ``acting`` (rows,) and ``sticks`` (m,) are of bool; rows of places with the largest ``pushes`` (m,) come first.
         """
         assert self._rubbing is not None
         jacobian = self._jacobian / np.maximum(np.linalg.norm(self._jacobian, axis=1), TINY)[:, None]

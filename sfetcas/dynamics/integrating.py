@@ -112,8 +112,8 @@ class Taken:
     iterations : int
     gap : float
         Largest gap of the constraints at its end.
-    rubbed : ndarray (stages,)
-        What friction at obstacles has taken away since its begin; empty where nothing rubs.
+    rubbed : ndarray (n,)
+        What friction at obstacles has taken away since its begin at :attr:`rubbed_at`; empty where nothing rubs.
     """
 
     begin: Memory
@@ -128,6 +128,11 @@ class Taken:
     iterations: int
     gap: float
     rubbed: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def rubbed_at(self) -> Array:
+        """The stages as fractions of h; where there is but one also the middle."""
+        return self.places if len(self.places) > 1 else np.array([0.5, 1.0])
 
     @property
     def converged(self) -> bool:
@@ -232,13 +237,14 @@ class Stepper:
         assert rubbing is not None
         end = rubbing.of_quantities(taken.after.rates[0])
         if not rubs.slides.any():
-            taken = replace(taken, rubbed=np.zeros(method.stages))
+            taken = replace(taken, rubbed=np.zeros(len(taken.rubbed_at)))
         elif method.stages == 1:
             ends = (begin.y, begin.rates[0], begin.lam), (taken.after.y, taken.after.rates[0], taken.after.lam)
             first, last = (
                 rubbing.power(rubs, rubbing.displacements(y), rubbing.of_quantities(v), lam) for y, v, lam in ends
             )
-            taken = replace(taken, rubbed=np.array([0.5 * taken.h * (first + last)]))
+            # The power is taken to be linear in time.
+            taken = replace(taken, rubbed=taken.h * np.array([0.375 * first + 0.125 * last, 0.5 * (first + last)]))
         else:
             nodes = np.array([0.0, *method.places])
             v = (differentiation(nodes) @ np.vstack([begin.x, taken.x]))[1:] / taken.h

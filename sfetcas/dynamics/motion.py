@@ -100,7 +100,7 @@ class Mover:
         )
 
     def _friction(self, forces: Array, sample: Sample) -> dict[str, tuple[Array, bool]]:
-        """Of the places that stick or slide, by the names of their rows, forces (3,) along obstacles, N, and which does."""
+        """Of places that stick or slide, by the names of their rows, forces (3,) along obstacles, N, and which do."""
         rubbing, rubs = self.inertia.system.rubbing, sample.rubs
         if rubbing is None or rubs is None:
             return {}
@@ -285,10 +285,10 @@ class StopEvent:
     side : str
         ``taut`` of a tendon; ``low`` or ``high`` of a stop; ``touching`` or ``sticking`` of an obstacle.
     acts : bool
-        Whether the tendon is taut, the spring at its stop, the member at the obstacle, or held by its friction, from then
-        on.
+        Whether from then on the tendon is taut, the spring at its stop, the member at the obstacle, or held by its
+        friction.
     impulse : float
-        Of the tension, the stop or the obstacle (across it), not below zero, N s; N m s of a stop of an angle; zero where
+        Of the tension, the stop or across the obstacle, not below zero, N s; N m s of a stop of an angle; zero where
         nothing hits.
     dissipated : float
         The energy that all impulses of that time dissipate, J, at the largest of them; else zero.

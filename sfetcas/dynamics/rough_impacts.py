@@ -1,8 +1,9 @@
-"""Impulses with Coulomb friction: at one instant, along rows that act on one side and in the directions along obstacles.
+"""Impulses with Coulomb friction at one instant: along rows that act on one side, and in directions along obstacles.
 
 With the opening speeds ``w`` of all directions before, and ``w+ = w + G p`` after the impulses ``p``,
 
-    p_n >= 0,   w_n+ >= r,   p_n (w_n+ - r) = 0,       |p_t| <= mu p_n,   p_t = -mu p_n w_t+ / |w_t+| where w_t+ is not zero,
+    p_n >= 0,    w_n+ >= r,    p_n (w_n+ - r) = 0,
+    |p_t| <= mu p_n,    p_t = -mu p_n w_t+ / |w_t+| where w_t+ is not zero,
 
 where ``r`` are the speeds of rebound.  ``G`` is symmetric and has no eigenvalue below zero.  One row after the other is
 solved by itself, again and again.  What is lost, ``-p . (w + w+) / 2``, is not below zero without rebound; where it

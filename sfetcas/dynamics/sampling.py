@@ -256,7 +256,7 @@ def _rubbed(taken: Taken, share: float) -> float:
     """What friction at obstacles has taken away in a share of a step."""
     if not len(taken.rubbed):
         return 0.0
-    row = evaluation(np.array([0.0, *taken.places]), np.array([np.clip(share, 0.0, 1.0)]))[0]
+    row = evaluation(np.array([0.0, *taken.rubbed_at]), np.array([np.clip(share, 0.0, 1.0)]))[0]
     return float(row[1:] @ taken.rubbed)
 
 

@@ -6,9 +6,10 @@ multipliers are the friction.  On one that slides with the velocity ``v`` along 
 
     - mu N d,      d = v / |v|,
 
-with the multiplier of its gap as ``N``.  ``d`` is known by a *way* ``a`` along the obstacle that it was a little earlier:
-from the shares ``v = s a + w`` with ``w`` across ``a`` it is ``(a + w / s) / |a + w / s|``, which goes on smoothly where
-``s`` falls through zero, so that steps may go beyond the end of sliding, where they are cut.  In the plane it is ``a``.
+with the multiplier of its gap as ``N``.  ``d`` follows from the *way* ``a`` along the obstacle that it was a little
+earlier: with the shares ``v = s a + w``, ``w`` across ``a``, it is ``(a + w / s) / |a + w / s|``.  This goes on smoothly
+where ``s`` falls through zero, so that steps may go beyond the end of sliding, where they are cut.  In the plane it is
+``a``.
 
 Everything is dimensionless; ``m`` is the number of places that rub.
 """
@@ -139,7 +140,7 @@ class Rubbing:
         return (self.axes - 1) * (self.axes + 1)
 
     def parts(self, flat: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
-        """Of :attr:`Rubs.flat` ``slides`` (m,), ``holds`` (m * (axes - 1),), ``ways`` (axes, m), what is told (told, m)."""
+        """``slides`` (m,), ``holds`` (m * (axes - 1),), ``ways`` (axes, m), what is told (told, m), of :attr:`Rubs.flat`."""
         m = len(self)
         slides, holds, ways, told = ca.vertsplit(flat, [0, m, self.axes * m, 2 * self.axes * m, self.size])
         return slides, holds, ca.reshape(ways, self.axes, m), ca.reshape(told, self.told, m)
