@@ -187,7 +187,7 @@ contacts.NAME.touching | | | motion | what touches: `nodes.tip`, `members.rod at
 contacts.NAME.friction | N | x y z | motion | of one with `friction`: the part of the force that is along it
 contacts.NAME.sticking | | | motion | of one with `friction`: what touches and does not slide; a list
 energy.elastic | J | | all | of members, springs, tendons and tubes
-energy.dissipated | J | | statics, motion | by laws with memory, since undeformed; in motion also by impacts
+energy.dissipated | J | | statics, motion | by laws with memory, since undeformed; in motion also by impacts, friction
 energy.loads | J | | statics, motion, parameters | from the undeformed scene
 energy.total | J | | statics, motion, parameters | sum of all that there are
 energy.potential | J | | statics, parameters | another name of the total of an equilibrium

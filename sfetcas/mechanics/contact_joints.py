@@ -72,6 +72,8 @@ class Sticking(Term):
     displacement that it keeps.
     """
 
+    along_face: ClassVar[bool] = True
+
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """One row in the plane, two in space."""

@@ -7,9 +7,8 @@ multipliers are the friction.  On one that slides with the velocity ``v`` along 
     - mu N d,      d = v / |v|,
 
 with the multiplier of its gap as ``N``.  ``d`` follows from the *way* ``a`` along the obstacle that it was a little
-earlier: with the shares ``v = s a + w``, ``w`` across ``a``, it is ``(a + w / s) / |a + w / s|``.  This goes on smoothly
-where ``s`` falls through zero, so that steps may go beyond the end of sliding, where they are cut.  In the plane it is
-``a``.
+earlier: with the shares ``v = s a + w``, ``w`` across ``a``, it is ``(a + w / s) / |a + w / s|``, in the plane ``a``.
+This goes on smoothly where ``s`` falls through zero: steps may go beyond the end of sliding, where they are cut.
 
 Everything is dimensionless; ``m`` is the number of places that rub.
 """
@@ -24,7 +23,7 @@ import numpy as np
 
 from ..mathematics.arrays import Array, Index
 from ..mathematics.constants import picked
-from .contact_joints import CENTRE, Sticking, directions_along
+from .contact_joints import directions_along
 from .model import Model
 from .terms import Term, name_of
 from .unilateral import UnilateralRows
@@ -112,7 +111,7 @@ class Rubbing:
         self.coefficients = np.array([model.scene.contacts[spot.contact].friction for spot in spots])
         first = len(model.positions.rows)
         numbers = range(1, len(model.terms))
-        self.group = next(i for i in numbers if isinstance(model.terms[i].kind, Sticking))
+        self.group = next(i for i in numbers if model.terms[i].kind.along_face)
         self.rows = first + model.terms[self.group].labels
         # Each gap is a row of the group of flat or of round obstacles.
         self._kinds = []
@@ -140,7 +139,11 @@ class Rubbing:
         return (self.axes - 1) * (self.axes + 1)
 
     def parts(self, flat: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
-        """``slides`` (m,), ``holds`` (m * (axes - 1),), ``ways`` (axes, m), what is told (told, m), of :attr:`Rubs.flat`."""
+        """The parts of :attr:`Rubs.flat`.
+
+        ``slides`` (m,), ``holds`` (m * (axes - 1),), ``ways`` (axes, m), and (told, m) where and along what places are
+        held.
+        """
         m = len(self)
         slides, holds, ways, told = ca.vertsplit(flat, [0, m, self.axes * m, 2 * self.axes * m, self.size])
         return slides, holds, ca.reshape(ways, self.axes, m), ca.reshape(told, self.told, m)
@@ -229,7 +232,7 @@ def rubbing_of(model: Model, unilateral: UnilateralRows) -> Rubbing | None:
 
 
 def _symbols(kind: Term) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Displacement, data, way and velocity of a place, and the expression of the normal is made of them."""
+    """Displacement, data of the gap, way and velocity of a place."""
     axes = kind.axes
     return ca.SX.sym("u", axes), ca.SX.sym("data", kind.sizes[3]), ca.SX.sym("way", axes), ca.SX.sym("v", axes)
 
@@ -250,7 +253,7 @@ def _direction_of(kind: Term, u: ca.SX, data: ca.SX, way: ca.SX, v: ca.SX) -> tu
     """Direction of sliding, and the speed along the way."""
     normal = _normal_of(kind, u, data)
     along, v = way - ca.dot(normal, way) * normal, v - ca.dot(normal, v) * normal
-    a = along / ca.sqrt(ca.sumsqr(along) + CENTRE)
+    a = along / ca.sqrt(ca.sumsqr(along) + NOTHING)
     speed = ca.dot(v, a)
     if not kind.space:
         return a, speed
@@ -282,6 +285,9 @@ def _sliding(kind: Term) -> ca.Function:
     arguments = [u, data, lam, weight, way, v]
     return ca.Function(f"sliding_{name_of(kind)}", arguments, [ca.densify(x) for x in found], {"cse": True})
 
+
+NOTHING = 1e-60
+"""Added to the square of a length that may be zero where nothing slides."""
 
 STRAIGHT = 1e-6
 """Speed, dimensionless, below which the direction of sliding no longer turns."""
