@@ -371,17 +371,13 @@ class Events:
     def _halted(self, taken: Taken) -> float | None:
         """Share of a step after which the first place that slides stands still; None where none does.
 
-        All of it where one has come to rest without that, or has drifted that no row held.
+        All of it where one has drifted that sticks and that no row held.
         """
         rubs = taken.begin.rubs
         if rubs is None or self._rubbing is None:
             return None
         if not rubs.slides.any() or self._speed(taken.after) >= -BACK:
-            # Held by what else sticks it may come to rest little by little.
-            ebbs = (self._speeds(taken.begin) > STILL) & (self._speeds(taken.after) <= STILL)
-            drifts = rubs.drifted(self._rubbing.displacements(taken.after.y)) > DRIFTED
-            return 1.0 if drifts or ebbs.any() else None
-
+            return 1.0 if rubs.drifted(self._rubbing.displacements(taken.after.y)) > DRIFTED else None
         # What begins to slide has no speed yet.
         begun = BACK if self._speed(taken.begin) <= BACK else 0.0
 
