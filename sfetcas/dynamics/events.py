@@ -194,8 +194,7 @@ class Events:
             steps = self._advanced(taken, min((self._last + soon - begin.t) / taken.h, 1.0))
             memory = steps[-1].after
             opened = self._opened(memory.q, memory.y, memory.t, memory)
-            # What slid back a little, as it stood still too late, does so no further than it may be inside.
-            if (opened >= -allowed).all() and self._speed(memory) * soon > -self._late:
+            if (opened >= -allowed).all() and self._speed(memory) > -BACK:
                 break
         else:
             return None
@@ -455,7 +454,7 @@ class Events:
         u = rubbing.displacements(memory.y)
         along = rubbing.along(u, rubbing.of_quantities(memory.rates[0]))
         speeds = np.linalg.norm(along, axis=1)
-        still = touches & ((speeds <= STILL) | (self._speeds(memory) < -BACK))
+        still = touches & (speeds <= STILL)
         velocity = self._impacts.at(memory).nearest(touching, still)
         ways = np.where((touches & ~still)[:, None], along / np.maximum(speeds, STILL)[:, None], rubs.ways)
         if slips is not None and slips.any():
@@ -539,12 +538,7 @@ class Events:
         """
         acting, rubs = self._chosen(memory, choice, collision)
         memory = replace(memory, acting=acting.astype(float), rubs=rubs)
-        try:
-            soon = self._soon(memory, h)
-        except SolveError:
-            if rubs is None or not rubs.sticks.any():
-                raise
-            return self._loosened(memory, rubs, h)
+        soon = self._soon(memory, h)
         wrong = np.where(acting, soon.forces < -soon.rounding, touching[: len(acting)] & (soon.opened < -ROUNDING))
         if rubs is not None and self._rubbing is not None:
             slips = soon.spare < -soon.rounding
@@ -563,21 +557,6 @@ class Events:
             lam[self._rubbing.rows] = -np.einsum("mka,ma->mk", rubs.frames, soon.friction) * rubs.holds
         return wrong, lam, memory
 
-    def _loosened(self, memory: Memory, rubs: Rubs, h: float) -> tuple[Array, None, Memory]:
-        """As :meth:`_tried` of a choice that holds more than a step can follow: the last place is to slide.
-
-        It would slide the way that it goes without friction.
-        """
-        assert self._rubbing is not None
-        last = np.arange(len(rubs.sticks)) == np.flatnonzero(rubs.sticks)[-1]
-        holds = np.where(last[:, None], 0.0, rubs.holds)
-        after = self._shortly(replace(memory, rubs=replace(rubs, holds=holds)), h).after
-        u, v = self._rubbing.displacements(after.y), self._rubbing.of_quantities(after.rates[0])
-        along = self._rubbing.along(u, v)
-        size = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-        ways = np.where(last[:, None], along / size, rubs.ways)
-        return np.append(np.zeros(len(self.rows), bool), last), None, replace(memory, rubs=replace(rubs, ways=ways))
-
     def _consistent(self, memory: Memory) -> Memory:
         """The state with the nearest velocities that all acting rows allow."""
         acting = memory.acting > 0.0
@@ -591,22 +570,17 @@ class Events:
 
     def _soon(self, memory: Memory, h: float) -> Soon:
         """What a short step from a state says."""
-        taken = self._shortly(memory, h)
+        short = self.stepper.starter
+        taken = short.step(replace(memory, last=None, rates=memory.rates[: short.method.kept]), h)
+        if not taken.converged:
+            seconds = memory.t * self.stepper.time
+            raise SolveError(Status.STOPPED, f"Newton's method did not converge at {seconds:.6g} s", memory)
         lam = evaluation(taken.places, np.zeros(1))[0] @ taken.lam
         forces = self.signs * lam[self.rows]
         most = float(np.abs(forces * memory.acting).max(initial=0.0))
         rounding = float(np.finfo(float).eps) * ROUNDED / h**2 + RELATIVE * most
         spare, friction = self._spare(memory, lam)
         return Soon(forces, self._openings(taken.after), rounding, friction, spare, self._speeds(taken.after))
-
-    def _shortly(self, memory: Memory, h: float) -> Taken:
-        """A short step."""
-        short = self.stepper.starter
-        taken = short.step(replace(memory, last=None, rates=memory.rates[: short.method.kept]), h)
-        if not taken.converged:
-            seconds = memory.t * self.stepper.time
-            raise SolveError(Status.STOPPED, f"Newton's method did not converge at {seconds:.6g} s", memory)
-        return taken
 
     def _openings(self, memory: Memory) -> Array:
         return self._opened(memory.q, memory.y, memory.t, memory) + self._offset

@@ -420,23 +420,11 @@ class _Fixed:
         count = max(1, int(np.ceil(span / self.h - 1e-9)))
         memory = self._stepper.refreshed(memory, span / count)
         for k in range(count):
-            h = (end - memory.t) / (count - k)
-            until, shorter = memory.t + h, True
-            while shorter:
-                taken = self._taken(memory, h)
-                memory = taken.after
-                yield taken
-                shorter, h = taken.h < h, until - memory.t
-
-    def _taken(self, memory: Memory, h: float) -> Taken:
-        """A step of a length, or a shorter one where something slides so slowly that it cannot be followed."""
-        taken = self._stepper.step(memory, h)
-        while not taken.converged and memory.rubs is not None and memory.rubs.slides.any() and h > SHORTEST:
-            h *= 0.5
-            taken = self._stepper.step(memory, h)
-        if not taken.converged:
-            raise _failed(self._stepper, taken)
-        return taken
+            taken = self._stepper.step(memory, (end - memory.t) / (count - k))
+            if not taken.converged:
+                raise _failed(self._stepper, taken)
+            memory = taken.after
+            yield taken
 
 
 class _Adaptive:
