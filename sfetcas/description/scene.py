@@ -122,7 +122,7 @@ class Scene(Record):
     magnets : table by name
         ``[magnets.NAME]``: magnetised members and magnetic dipoles.
     contacts : table by name
-        ``[contacts.NAME]``: frictionless obstacles.
+        ``[contacts.NAME]``: obstacles, and members that touch each other.
     analysis : table
         ``[analysis]``: what is to be computed.
     expect : list of tables

@@ -205,8 +205,8 @@ class MotionState(Configuration):
         """``kinetic`` and ``elastic`` energy, potential of the present ``loads``, and their sum ``total``, N m.
 
         ``loads`` is minus the present forces times displacements, so that the sum also changes while loads change.
-        Where laws have memory, tendons may be slack or springs have stops also what is ``dissipated``, in impacts and
-        otherwise, which the total does not have.
+        Where laws have memory, tendons may be slack, springs have stops or members touch obstacles also what is
+        ``dissipated``, in impacts, by friction and otherwise, which the total does not have.
         """
         kinetic, elastic, loads = (part * self.model.scales.moment for part in self.energies)
         lost, spent = dict[str, float](), self.fields.dissipated
