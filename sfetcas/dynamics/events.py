@@ -126,9 +126,10 @@ class Events:
         # When each row was hit last, and how far inside it was when it happened last.
         self._hit = np.full(len(self.rows), -1e300)
         self._depth = self._offset
-        # Times of events; times and speeds of the last impacts, of all rows and of each.
+        # The places that rub, and their rows.
         self._rubbing = self.system.rubbing
         self._rough = np.zeros(0, np.intp) if self._rubbing is None else self._rubbing.of
+        # Times of events; times and speeds of the last impacts, of all rows and of each.
         self._times: list[float] = []
         self._hits: dict[int, list[tuple[float, float]]] = {}
 
@@ -153,9 +154,8 @@ class Events:
         known = [one for one in (closing, released, halted) if one is not None]
         if not known:
             return None
-        share = min(known)
+        share, nothing = min(known), np.zeros(len(self.rows), bool)
         if share == 1.0 and halted == 1.0:
-            nothing = np.zeros(len(self.rows), bool)
             return Passed([taken], self._after(taken.after, nothing, nothing, taken.h))
         if (together := self._together(taken, share)) is not None:
             return together
@@ -163,7 +163,6 @@ class Events:
         steps = self._advanced(taken, share) if share * taken.h > SHORTEST else []
         memory = steps[-1].after if steps else taken.begin
         acting = memory.acting > 0.0
-        nothing = np.zeros(len(acting), bool)
         if halted is not None and share == halted:
             return Passed(steps, self._after(memory, nothing, nothing, taken.h))
         if released is None or share < released:
@@ -323,9 +322,8 @@ class Events:
         at_stages = (self.signs * taken.lam[:, self.rows])[:, acting]
         before = (self.signs * begin.lam[self.rows])[acting]
         if begin.rubs is not None:
-            spare = np.array([self._spare(begin, lam)[0] for lam in (*taken.lam, begin.lam)])[
-                :, begin.rubs.sticks > 0.0
-            ]
+            spare = np.array([self._spare(begin, lam)[0] for lam in (*taken.lam, begin.lam)])
+            spare = spare[:, begin.rubs.sticks > 0.0]
             at_stages, before = np.hstack([at_stages, spare[:-1]]), np.append(before, spare[-1])
         # Forces of stages are not as accurate as what decides: it is asked for also where they only come near to zero.
         doubtful = [
@@ -460,8 +458,7 @@ class Events:
         if slips is not None and slips.any():
             # It slides against the friction that has held it.
             _, friction = self._spare(memory, memory.lam)
-            size = np.maximum(np.linalg.norm(friction, axis=1, keepdims=True), 1e-300)
-            ways = np.where(slips[:, None], -friction / size, ways)
+            ways = np.where(slips[:, None], _against(friction), ways)
         # What has been held so far stays where it is.
         stays, fresh = still & (rubs.holds.all(axis=1)), rubbing.idle(u)
         frames = np.where(stays[:, None, None], rubs.frames, fresh.frames)
@@ -545,10 +542,8 @@ class Events:
             back = touching[len(acting) :] & (soon.speeds < -ROUNDED * float(np.finfo(float).eps) / h)
             wrong = np.concatenate([wrong, slips | back])
             # What does not hold slides against the friction that would.
-            size = np.maximum(np.linalg.norm(soon.friction, axis=1, keepdims=True), 1e-300)
-            memory = replace(
-                memory, rubs=replace(rubs, ways=np.where(slips[:, None], -soon.friction / size, rubs.ways))
-            )
+            ways = np.where(slips[:, None], _against(soon.friction), rubs.ways)
+            memory = replace(memory, rubs=replace(rubs, ways=ways))
         if wrong.any():
             return wrong, None, memory
         lam = np.zeros(len(memory.lam))
@@ -603,6 +598,11 @@ def _choices(touching: Array) -> Iterator[Array]:
     for count in range(len(rows), -1, -1) if len(rows) <= FEW else ():
         for chosen in itertools.combinations(rows.tolist(), count):
             yield np.isin(np.arange(len(touching)), chosen)
+
+
+def _against(friction: Array) -> Array:
+    """Unit vectors (m, axes) against forces (m, axes), zero of those that are zero."""
+    return np.asarray(-friction / np.maximum(np.linalg.norm(friction, axis=1, keepdims=True), 1e-300))
 
 
 def _with_velocity(rates: Array, velocity: Array) -> Array:

@@ -7,15 +7,18 @@ on them in turn.  Multipliers are linear in these forces, and so is what is left
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
-from ..mechanics.rubbing import Rubbing
 from .projecting import factor_closings
-from .sampling import Sample
+
+if TYPE_CHECKING:
+    from ..mechanics.rubbing import Rubbing
+    from .sampling import Sample
 
 __all__ = ["pushed_along", "rubbed"]
 
