@@ -113,7 +113,7 @@ def every_kind():
     for table in (
         {**plane, "springs": stopped, "loads": force},
         {**clamped, "sections": stretching, "springs": pulled, "motions": moved},
-        {**clamped, "contacts": floor, "loads": force},
+        {**clamped, "contacts": {"floor": {**floor["floor"], "friction": 0.1}}, "loads": force},
         {**clamped, **_crossed(clamped), "loads": force},
         {**clamped, "sections": plastic, "loads": force},
         {**clamped, "tendons": {"t": {"way": [{"member": "m", "offset": 0.1}], "pull": 0.01}}},

@@ -61,7 +61,7 @@ TABLES = {
     "FieldTable": ("Magnetic fields: table", "`table = { ... }` of a field: columns, or the CSV file of them"),
     "Magnet": ("Magnets", "`[magnets.NAME]`: magnetised members and dipoles"),
     "History": ("Histories", "`[histories.NAME]`"),
-    "Contact": ("Contacts", "`[contacts.NAME]`: frictionless obstacles"),
+    "Contact": ("Contacts", "`[contacts.NAME]`: obstacles, and members that touch each other"),
     "Analysis": ("Analysis", "`[analysis]`"),
     "Until": ("Analysis: until", "`until = { ... }` of the analysis: what ends a motion early"),
     "Expect": ("Expect", "`[[expect]]`: a known value of the answer"),

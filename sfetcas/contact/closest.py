@@ -500,10 +500,10 @@ def _closest_on_pieces(p: Array, p_end: Array, r: Array, r_end: Array) -> tuple[
 
 
 def answers(fields: Fields) -> dict[str, dict[str, Any]]:
-    """For each contact the ``force`` (3,) N on the member, ``at``, ``gap`` in m, and ``member``; lists for several places.
+    """For each contact the ``force`` (3,) N on the member, ``at``, ``gap`` in m, ``member``; lists for several places.
 
-    Between members ``other`` and ``other_at`` are of the second one.  With friction also ``friction`` (3,) N, the part of
-    the force along the surfaces, and whether it is ``sticking``.
+    Between members ``other`` and ``other_at`` are of the second one.  With friction also ``friction`` (3,) N, the part
+    of the force along the surfaces, and whether it is ``sticking``.
     """
     scene, found = fields.model.scene, dict[str, dict[str, Any]]()
     closest = Closest(scene)

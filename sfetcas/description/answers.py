@@ -99,6 +99,7 @@ class AnswerKind:
             "contacts.NAME.member",
             "contacts.NAME.other",
             "contacts.NAME.touching",
+            "contacts.NAME.sticking",
             "tendons.NAME.slack",
             "tendons.NAME.tensions",
             "tendons.NAME.released",
@@ -183,8 +184,10 @@ contacts.NAME.member | | | statics | which it touches; all are lists where it to
 contacts.NAME.other | | | statics | between members: the second one; the force is that on the first
 contacts.NAME.other_at | | | statics | fraction of the length of the second one
 contacts.NAME.touching | | | motion | what touches: `nodes.tip`, `members.rod at 0.25`; a list
+contacts.NAME.friction | N | x y z | statics, motion | with `friction`: the part of the force along the surfaces
+contacts.NAME.sticking | | | statics, motion | with `friction`: whether it does; in motions a list of what does
 energy.elastic | J | | all | of members, springs, tendons and tubes
-energy.dissipated | J | | statics, motion | by laws with memory, since undeformed; in motion also by impacts
+energy.dissipated | J | | statics, motion | by laws with memory, since undeformed; in motion also by impacts, friction
 energy.loads | J | | statics, motion, parameters | from the undeformed scene
 energy.total | J | | statics, motion, parameters | sum of all that there are
 energy.potential | J | | statics, parameters | another name of the total of an equilibrium
@@ -230,6 +233,8 @@ APPLIES: dict[str, Callable[[Any, Any], bool]] = {
     "tendons.NAME.far_tension": lambda scene, tendon: tendon.friction is not None,
     "tendons.NAME.tensions": lambda scene, tendon: tendon.friction is not None,
     "tendons.NAME.released": lambda scene, tendon: tendon.friction is not None,
+    "contacts.NAME.friction": lambda scene, contact: contact.friction > 0.0,
+    "contacts.NAME.sticking": lambda scene, contact: contact.friction > 0.0,
     "rings.NAME.drive": lambda scene, ring: ring.driven,
     "motions.NAME.moment": lambda scene, motion: motion.rotation is not None,
     "motions.NAME.force": lambda scene, motion: motion.displacement is not None,

@@ -1,4 +1,4 @@
-"""Frictionless contact: of members with obstacles, points, lines, planes, circles, cylinders and spheres, and of
+"""Contact: of members with obstacles, points, lines, planes, circles, cylinders and spheres, and of
 members with each other.
 """
 
@@ -54,7 +54,7 @@ def _share(value: float) -> float:
 
 
 class Contact(Record):
-    """A frictionless obstacle, or members that touch each other; forces push members apart and never hold them.
+    """An obstacle, or members that touch each other; forces push members apart and never hold them.
 
     Parameters
     ----------
@@ -85,7 +85,8 @@ class Contact(Record):
     member_radius : m
         Radius of the surface of the members that an obstacle stops; by default their centre line touches it.
     friction : 1
-        Coulomb's coefficient: the largest force along the obstacle over that across it.
+        Coulomb's coefficient: the largest force along the surfaces over that across them; in statics, where it counts
+        in which order the steps come, and in motions.
     restitution : 1
         Speed across the obstacle after an impact over that before, from 0 to 1; of motions alone.
     """

@@ -122,7 +122,7 @@ class Scene(Record):
     magnets : table by name
         ``[magnets.NAME]``: magnetised members and magnetic dipoles.
     contacts : table by name
-        ``[contacts.NAME]``: frictionless obstacles.
+        ``[contacts.NAME]``: obstacles, and members that touch each other.
     analysis : table
         ``[analysis]``: what is to be computed.
     expect : list of tables
@@ -314,7 +314,7 @@ class Scene(Record):
         return any(
             contact.between_members
             or contact.member_radius > 0.0
-            or contact.friction > 0.0
+            or (contact.friction > 0.0 and self.analysis.type != "dynamic")
             or any(_of_points(self, contact, member) for member in members_of(contact, self.members))
             for contact in self.contacts.values()
         )
@@ -1028,7 +1028,8 @@ def _check_points(scene: Scene) -> None:
     where, found = ("contacts", name), f"found {what}"
     if scene.analysis.type != "static":
         message = f"{found} with analysis.type = {scene.analysis.type!r}"
-        raise SceneError(f"{message}, accepted: with 'static'", where)
+        accepted = "'static', where the order of steps is known, or 'dynamic'" if what == "friction" else "'static'"
+        raise SceneError(f"{message}, accepted: with {accepted}", where)
     edges = [other for other, stop in scene.obstacles.items() if stop.kind == "sharp"]
     if edges:
         message = f"{found} beside the edge {edges[0]!r}, accepted: planes, circles, cylinders and spheres"
@@ -1044,7 +1045,7 @@ def _why_points(scene: Scene, name: str) -> str:
         return "contact between members"
     if contact.member_radius > 0.0:
         return "a radius of members on an obstacle"
-    if contact.friction > 0.0:
+    if contact.friction > 0.0 and scene.analysis.type != "dynamic":
         return "friction"
     members = (m for m in members_of(contact, scene.members) if _of_points(scene, contact, m))
     return next((f"an obstacle of {member!r}, which has a law or stretches" for member in members), "")

@@ -5,8 +5,12 @@ Between events the motion is that of a system in which the rows that act are con
 
 - The force of a row falls through zero: it ceases to act.  Velocities do not change.
 - The opening of a row falls through zero: an impact, see :mod:`~sfetcas.dynamics.impacts`.
+- Friction that holds a place on an obstacle grows beyond what it can be: the place slides.
+- The speed of a place that slides falls through zero: it sticks, or slides back.
 
-After either of them the rows that stay closed are those whose forces are not below zero at once.
+After each of them the rows that stay closed are those whose forces are not below zero at once.  Of the places that rest
+on obstacles with friction those stick whose friction is enough for it; the others slide the way in which they start.
+Between the two is a gap: what slides must need more friction than there is by a share that is beyond rounding.
 
 Times are those at which a step from the begin of the present one ends at zero, so that they are as accurate as steps
 are.  Forces are multipliers of rows, whose order in the length of the step is less than that of positions; where they
@@ -34,7 +38,8 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.interpolation import evaluation
 from ..mechanics.equations import State
-from .impacts import Impacts
+from ..mechanics.rubbing import STILL, Rubs
+from .impacts import Collision, Impacts
 from .integrating import SHORTEST, Memory, Passed, Stepper, Taken
 from .sampling import turned_by
 
@@ -56,6 +61,8 @@ class Event:
         Along the row.
     lost : float
         The energy that all impulses of that time take away, at the largest of them; else zero.
+    sticks : bool
+        Whether it is not the row that begins or ceases to act, but what holds its place along the obstacle.
     """
 
     t: float
@@ -63,6 +70,33 @@ class Event:
     acts: bool
     impulse: float
     lost: float
+    sticks: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Soon:
+    """What a short step says of the instant at its begin.
+
+    Attributes
+    ----------
+    forces, opened : ndarray (rows,)
+        Forces of the rows just after its begin, and openings at its end.
+    rounding : float
+        What of forces is rounding.
+    friction : ndarray (m, axes)
+        Forces just after its begin that hold what sticks.
+    spare : ndarray (m,)
+        What friction could be more of what sticks; infinite of others.
+    speeds : ndarray (m,)
+        Speeds at its end of what slides, in the direction of sliding; infinite of others.
+    """
+
+    forces: Array
+    opened: Array
+    rounding: float
+    friction: Array
+    spare: Array
+    speeds: Array
 
 
 class Events:
@@ -92,6 +126,9 @@ class Events:
         # When each row was hit last, and how far inside it was when it happened last.
         self._hit = np.full(len(self.rows), -1e300)
         self._depth = self._offset
+        # The places that rub, and their rows.
+        self._rubbing = self.system.rubbing
+        self._rough = np.zeros(0, np.intp) if self._rubbing is None else self._rubbing.of
         # Times of events; times and speeds of the last impacts, of all rows and of each.
         self._times: list[float] = []
         self._hits: dict[int, list[tuple[float, float]]] = {}
@@ -113,24 +150,31 @@ class Events:
 
     def within(self, taken: Taken) -> Passed | None:
         """What happens first in a step that was taken; None where nothing does."""
-        closing, released = self._closing(taken), self._released(taken)
-        if closing is None and released is None:
+        closing, released, halted = self._closing(taken), self._released(taken), self._halted(taken)
+        known = [one for one in (closing, released, halted) if one is not None]
+        if not known:
             return None
-        share = min(one for one in (closing, released) if one is not None)
+        share, nothing = min(known), np.zeros(len(self.rows), bool)
+        if share == 1.0 and halted == 1.0:
+            return Passed([taken], self._after(taken.after, nothing, nothing, taken.h))
         if (together := self._together(taken, share)) is not None:
             return together
         self._refuse_endless(taken.begin)
         steps = self._advanced(taken, share) if share * taken.h > SHORTEST else []
         memory = steps[-1].after if steps else taken.begin
         acting = memory.acting > 0.0
+        if halted is not None and share == halted:
+            return Passed(steps, self._after(memory, nothing, nothing, taken.h))
         if released is None or share < released:
             opened = np.where(acting, np.inf, self._openings(memory))
             # The first of them, which may be at the end of a step that is too short, and those that close with it.
             closes = opened <= max(TOGETHER, float(opened.min()))
-            return Passed(steps, self._after(memory, closes, np.zeros(len(acting), bool), taken.h))
-        forces = np.where(acting, self._forces(self._consistent(memory), self._length(taken.h))[0], np.inf)
-        ceases = np.arange(len(acting)) == np.argmin(forces)
-        return Passed(steps, self._after(memory, np.zeros(len(acting), bool), ceases, taken.h))
+            return Passed(steps, self._after(memory, closes, nothing, taken.h))
+        soon = self._soon(self._consistent(memory), self._length(taken.h))
+        least = np.concatenate([np.where(acting, soon.forces, np.inf), soon.spare])
+        first = np.arange(len(least)) == np.argmin(least)
+        ceases, slips = first[: len(acting)], first[len(acting) :]
+        return Passed(steps, self._after(memory, nothing, ceases, taken.h, slips))
 
     def _together(self, taken: Taken, share: float) -> Passed | None:
         """All that happens shortly after another event, at the end of a short step; None where that would be too late.
@@ -149,7 +193,7 @@ class Events:
             steps = self._advanced(taken, min((self._last + soon - begin.t) / taken.h, 1.0))
             memory = steps[-1].after
             opened = self._opened(memory.q, memory.y, memory.t, memory)
-            if (opened >= -allowed).all():
+            if (opened >= -allowed).all() and self._speed(memory) > -BACK:
                 break
         else:
             return None
@@ -157,8 +201,8 @@ class Events:
         closes = ~acting & (opened + self._offset < TOGETHER)
         ceases = np.zeros(len(acting), bool)
         if acting.any():
-            forces, _, rounding = self._forces(self._consistent(memory), self._length(taken.h))
-            ceases = acting & (forces < -rounding)
+            now = self._soon(self._consistent(memory), self._length(taken.h))
+            ceases = acting & (now.forces < -now.rounding)
         return Passed(steps, self._after(memory, closes, ceases, taken.h))
 
     def _at(self, taken: Taken, share: float) -> Memory:
@@ -277,6 +321,10 @@ class Events:
             return None
         at_stages = (self.signs * taken.lam[:, self.rows])[:, acting]
         before = (self.signs * begin.lam[self.rows])[acting]
+        if begin.rubs is not None:
+            spare = np.array([self._spare(begin, lam)[0] for lam in (*taken.lam, begin.lam)])
+            spare = spare[:, begin.rubs.sticks > 0.0]
+            at_stages, before = np.hstack([at_stages, spare[:-1]]), np.append(before, spare[-1])
         # Forces of stages are not as accurate as what decides: it is asked for also where they only come near to zero.
         doubtful = [
             float(place)
@@ -293,14 +341,77 @@ class Events:
         return None
 
     def _least(self, memory: Memory, h: float) -> float:
-        """The least force of a row that acts, over that which is rounding."""
-        forces, _, rounding = self._forces(self._consistent(memory), self._length(h))
-        return float(forces[memory.acting > 0.0].min()) + rounding
+        """The least force of a row that acts, over that which is rounding, or the least that friction has to spare."""
+        soon = self._soon(self._consistent(memory), self._length(h))
+        return min(float(soon.forces[memory.acting > 0.0].min()), float(soon.spare.min(initial=np.inf))) + soon.rounding
+
+    def _spare(self, memory: Memory, lam: Array) -> tuple[Array, Array]:
+        """What friction could be more of what sticks (m,), infinite of others, and what it is (m, axes)."""
+        if self._rubbing is None or memory.rubs is None:
+            return np.zeros(0), np.zeros((0, 0))
+        friction = -np.einsum("mka,mk->ma", memory.rubs.frames, lam[self._rubbing.rows] * memory.rubs.holds)
+        most = -self._rubbing.coefficients * lam[self._rubbing.gaps]
+        spare = (1.0 + GAP) * most - np.linalg.norm(friction, axis=1)
+        return np.where(memory.rubs.sticks > 0.0, spare, np.inf), friction
+
+    def _speeds(self, memory: Memory) -> Array:
+        """Speeds (m,) of what slides, in the direction of sliding; infinite of others."""
+        if self._rubbing is None or memory.rubs is None:
+            return np.zeros(0)
+        u, v = self._rubbing.displacements(memory.y), self._rubbing.of_quantities(memory.rates[0])
+        _, speeds = self._rubbing.directions(u, v, memory.rubs.ways)
+        return np.where(memory.rubs.slides > 0.0, speeds, np.inf)
+
+    def _speed(self, memory: Memory) -> float:
+        return float(self._speeds(memory).min(initial=np.inf))
+
+    def _halted(self, taken: Taken) -> float | None:
+        """Share of a step after which the first place that slides stands still; None where none does.
+
+        All of it where one has drifted that sticks and that no row held.
+        """
+        rubs = taken.begin.rubs
+        if rubs is None or self._rubbing is None:
+            return None
+        if not rubs.slides.any() or self._speed(taken.after) >= -BACK:
+            return 1.0 if rubs.drifted(self._rubbing.displacements(taken.after.y)) > DRIFTED else None
+        # What begins to slide has no speed yet.
+        begun = BACK if self._speed(taken.begin) <= BACK else 0.0
+
+        def left(share: float) -> float:
+            return self._speed(self._at(taken, share)) + begun
+
+        if left(0.0) <= 0.0:
+            return 0.0
+        try:
+            return _root(left, 0.0, 1.0, XTOL)
+        except SolveError:
+            return self._halting(taken)
+
+    def _halting(self, taken: Taken) -> float:
+        """As :meth:`_halted`, where the direction of sliding swings round too fast beside rest for steps to end there.
+
+        What begins there is slower, and has shorter steps.
+        """
+        low, high = 0.0, 1.0
+        while high - low > XTOL:
+            share = 0.5 * (low + high)
+            try:
+                speed = self._speed(self._at(taken, share))
+            except SolveError:
+                speed = -np.inf
+            low, high = (share, high) if speed > 0.0 else (low, share)
+            if 0.0 < speed <= STILL:
+                break
+        return low
 
     # -- states ---------------------------------------------------------------------------------------
 
-    def _after(self, memory: Memory, closes: Array, ceases: Array, h: float) -> Memory:
-        """The state after an event at which rows close or cease to act, both (rows,) of bool."""
+    def _after(self, memory: Memory, closes: Array, ceases: Array, h: float, slips: Array | None = None) -> Memory:
+        """The state after an event at which rows close or cease to act, both (rows,) of bool.
+
+        ``slips`` (m,) of bool are the places that stick no longer.
+        """
         before = memory.acting > 0.0
         collision = self._impacts.at(memory)
         self._again = self._again + 1 if memory.t == self._last else 0
@@ -316,19 +427,60 @@ class Events:
         self._offset, self._last = self._depth.copy(), memory.t
         there = replace(memory, rates=_with_velocity(memory.rates, velocity), last=None, lost=memory.lost + lost)
         there = replace(there, held=-self.signs * opened)
-        acting, lam = self._settled(there, touching & ~ceases, touching, h)
-        there = replace(there, acting=acting.astype(float), lam=lam)
+        there, still = self._resting(there, touching, slips)
+        acting, lam, rubs = self._settled(there, touching & ~ceases, touching, h, still)
+        there = replace(there, acting=acting.astype(float), lam=lam, rubs=rubs)
         self._offset[acting] = 0.0
         hardest = int(np.argmax(impulses))
         for i in np.flatnonzero((acting != before) | (impulses > 0.0)).tolist():
             own = lost if i == hardest else 0.0
             self.found.append(Event(memory.t, i, bool(acting[i]), float(impulses[i]), own))
+        if rubs is not None and memory.rubs is not None:
+            changed = (rubs.sticks != memory.rubs.sticks) & acting[self._rough]
+            for k in np.flatnonzero(changed).tolist():
+                self.found.append(Event(memory.t, int(self._rough[k]), bool(rubs.sticks[k]), 0.0, 0.0, sticks=True))
         return there
 
-    def _settled(self, memory: Memory, acting: Array, touching: Array, h: float) -> tuple[Array, Array]:
-        """Which of the rows that touch act from now on, (rows,) of bool, and all multipliers."""
+    def _resting(self, memory: Memory, touching: Array, slips: Array | None) -> tuple[Memory, Array]:
+        """The state with what is next to standing still at rest, and which places (m,) of bool that are.
+
+        Those are to stick, as is told in the state, but for those that slip; the others slide.
+        """
+        if self._rubbing is None or memory.rubs is None:
+            return memory, np.zeros(0, bool)
+        rubs, rubbing, touches = memory.rubs, self._rubbing, touching[self._rough]
+        u = rubbing.displacements(memory.y)
+        along = rubbing.along(u, rubbing.of_quantities(memory.rates[0]))
+        speeds = np.linalg.norm(along, axis=1)
+        still = touches & (speeds <= STILL)
+        velocity = self._impacts.at(memory).nearest(touching, still)
+        ways = np.where((touches & ~still)[:, None], along / np.maximum(speeds, STILL)[:, None], rubs.ways)
+        if slips is not None and slips.any():
+            # It slides against the friction that has held it.
+            _, friction = self._spare(memory, memory.lam)
+            ways = np.where(slips[:, None], _against(friction), ways)
+        # What has been held so far stays where it is.
+        stays, fresh = still & (rubs.holds.all(axis=1)), rubbing.idle(u)
+        frames = np.where(stays[:, None, None], rubs.frames, fresh.frames)
+        held = np.where(stays[:, None], rubs.held, fresh.held)
+        sticks = still if slips is None else still & ~slips
+        slides = (touches & ~sticks).astype(float)
+        found = Rubs(sticks.astype(float), slides, 0.0 * held, ways, frames, held)
+        return replace(memory, rates=_with_velocity(memory.rates, velocity), rubs=found), still
+
+    def _settled(
+        self, memory: Memory, acting: Array, touching: Array, h: float, still: Array
+    ) -> tuple[Array, Array, Rubs | None]:
+        """Which of the rows that touch act from now on, (rows,) of bool, all multipliers, and what sticks and slides.
+
+        ``still`` (m,) of bool are the places that may stick.
+        """
         if not touching.any():
-            return acting, np.zeros(len(memory.lam))
+            return acting, np.zeros(len(memory.lam)), memory.rubs
+        collision = None
+        if memory.rubs is not None:
+            acting, touching = np.append(acting, memory.rubs.sticks > 0.0), np.append(touching, still)
+            collision = self._impacts.at(memory)
         # Where it did not hold at this time in a longer step, a shorter one is asked.
         h = max(self._length(h) * SHORTER**self._again, SHORTEST / SHORTER)
         best, least = acting, len(acting) + 1
@@ -337,9 +489,9 @@ class Events:
             now, fewest, patience = acting, len(acting) + 1, PATIENCE
             while now.tobytes() not in tried and len(tried) < TRIED * int(touching.sum()) + TRIED:
                 tried.add(now.tobytes())
-                wrong, lam = self._tried(memory, now, touching, h)
+                wrong, lam, memory = self._tried(memory, now, touching, h, collision)
                 if lam is not None:
-                    return now, lam
+                    return now[: len(self.rows)], lam, memory.rubs
                 # All that is wrong is changed at once while less is wrong from time to time, then one row at a time.
                 count = int(wrong.sum())
                 best, least = (now, count) if count < least else (best, least)
@@ -347,31 +499,63 @@ class Events:
                 now = now ^ (wrong if patience > 0 else np.arange(len(wrong)) == np.flatnonzero(wrong)[-1])
             # What goes from one choice to the next may go round: where there are few all are tried.
             for choice in _choices(touching):
-                if choice.tobytes() not in tried and (lam := self._tried(memory, choice, touching, h)[1]) is not None:
-                    return choice, lam
+                if choice.tobytes() in tried:
+                    continue
+                _, lam, memory = self._tried(memory, choice, touching, h, collision)
+                if lam is not None:
+                    return choice[: len(self.rows)], lam, memory.rubs
             # Waves that are shorter than the step make what is true at once untrue a little later.
             h *= SHORTER
-        if self._of_obstacles[touching].any():
+        rows = touching[: len(self.rows)]
+        if self._of_obstacles[rows].any():
             # Waves through places side by side: what is wrong is an event at once.
-            return best, np.zeros(len(memory.lam))
+            chosen, rubs = self._chosen(memory, best, collision)
+            return chosen, np.zeros(len(memory.lam)), rubs
         seconds = memory.t * self.stepper.time
-        names = ", ".join(np.array(self.system.unilateral.names)[touching].tolist())
+        names = ", ".join(np.array(self.system.unilateral.names)[rows].tolist())
         raise SolveError(Status.STOPPED, f"at {seconds:.9g} s no choice of what acts holds, of {names}", memory)
 
-    def _tried(self, memory: Memory, acting: Array, touching: Array, h: float) -> tuple[Array, Array | None]:
-        """Rows (rows,) that a choice of those that act has wrong, and all multipliers where there are none."""
-        forces, opened, rounding = self._forces(replace(memory, acting=acting.astype(float)), h)
-        wrong = np.where(acting, forces < -rounding, touching & (opened < -ROUNDING))
+    def _chosen(self, memory: Memory, choice: Array, collision: Collision | None) -> tuple[Array, Rubs | None]:
+        """The rows (rows,) that act in a choice, of bool, and what sticks and slides."""
+        acting, sticks = choice[: len(self.rows)], choice[len(self.rows) :]
+        if memory.rubs is None or collision is None or self._rubbing is None:
+            return acting, None
+        pushed = acting[self._rough]
+        sticks, slides = pushed & sticks, (pushed & ~sticks).astype(float)
+        holds = collision.independent(acting, sticks, -memory.lam[self._rubbing.gaps])
+        return acting, replace(memory.rubs, sticks=sticks.astype(float), slides=slides, holds=holds)
+
+    def _tried(
+        self, memory: Memory, choice: Array, touching: Array, h: float, collision: Collision | None
+    ) -> tuple[Array, Array | None, Memory]:
+        """What (rows + m,) a choice of rows that act and places that stick has wrong.
+
+        Also all multipliers where there is nothing, and the state with the choice and the ways in which places would
+        slide.
+        """
+        acting, rubs = self._chosen(memory, choice, collision)
+        memory = replace(memory, acting=acting.astype(float), rubs=rubs)
+        soon = self._soon(memory, h)
+        wrong = np.where(acting, soon.forces < -soon.rounding, touching[: len(acting)] & (soon.opened < -ROUNDING))
+        if rubs is not None and self._rubbing is not None:
+            slips = soon.spare < -soon.rounding
+            back = touching[len(acting) :] & (soon.speeds < -ROUNDED * float(np.finfo(float).eps) / h)
+            wrong = np.concatenate([wrong, slips | back])
+            # What does not hold slides against the friction that would.
+            ways = np.where(slips[:, None], _against(soon.friction), rubs.ways)
+            memory = replace(memory, rubs=replace(rubs, ways=ways))
         if wrong.any():
-            return wrong, None
+            return wrong, None, memory
         lam = np.zeros(len(memory.lam))
-        lam[self.rows] = self.signs * np.where(acting, forces, 0.0)
-        return wrong, lam
+        lam[self.rows] = self.signs * np.where(acting, soon.forces, 0.0)
+        if rubs is not None and self._rubbing is not None:
+            lam[self._rubbing.rows] = -np.einsum("mka,ma->mk", rubs.frames, soon.friction) * rubs.holds
+        return wrong, lam, memory
 
     def _consistent(self, memory: Memory) -> Memory:
         """The state with the nearest velocities that all acting rows allow."""
         acting = memory.acting > 0.0
-        velocity, *_ = self._impacts.at(memory).solved(acting, np.zeros(len(acting), bool))
+        velocity = self._impacts.at(memory).nearest(acting)
         return replace(memory, rates=_with_velocity(memory.rates, velocity), last=None)
 
     @staticmethod
@@ -379,17 +563,19 @@ class Events:
         """Length of a short step where steps have the length h."""
         return min(h, max(SHARE * h, LEAST))
 
-    def _forces(self, memory: Memory, h: float) -> tuple[Array, Array, float]:
-        """Forces of the rows (rows,) just after a state, openings at the end of a short step, and what is rounding."""
+    def _soon(self, memory: Memory, h: float) -> Soon:
+        """What a short step from a state says."""
         short = self.stepper.starter
         taken = short.step(replace(memory, last=None, rates=memory.rates[: short.method.kept]), h)
         if not taken.converged:
             seconds = memory.t * self.stepper.time
             raise SolveError(Status.STOPPED, f"Newton's method did not converge at {seconds:.6g} s", memory)
-        forces = self.signs * (evaluation(taken.places, np.zeros(1))[0] @ taken.lam)[self.rows]
+        lam = evaluation(taken.places, np.zeros(1))[0] @ taken.lam
+        forces = self.signs * lam[self.rows]
         most = float(np.abs(forces * memory.acting).max(initial=0.0))
         rounding = float(np.finfo(float).eps) * ROUNDED / h**2 + RELATIVE * most
-        return forces, self._openings(taken.after), rounding
+        spare, friction = self._spare(memory, lam)
+        return Soon(forces, self._openings(taken.after), rounding, friction, spare, self._speeds(taken.after))
 
     def _openings(self, memory: Memory) -> Array:
         return self._opened(memory.q, memory.y, memory.t, memory) + self._offset
@@ -412,6 +598,11 @@ def _choices(touching: Array) -> Iterator[Array]:
     for count in range(len(rows), -1, -1) if len(rows) <= FEW else ():
         for chosen in itertools.combinations(rows.tolist(), count):
             yield np.isin(np.arange(len(touching)), chosen)
+
+
+def _against(friction: Array) -> Array:
+    """Unit vectors (m, axes) against forces (m, axes), zero of those that are zero."""
+    return np.asarray(-friction / np.maximum(np.linalg.norm(friction, axis=1, keepdims=True), 1e-300))
 
 
 def _with_velocity(rates: Array, velocity: Array) -> Array:
@@ -473,3 +664,12 @@ is shorter where they tell nothing.
 
 ROUNDED, RELATIVE = 10.0, 1e-9
 """Forces that are rounding: rounding of places over the square of the step, and the share of the largest force."""
+
+GAP = 1e-6
+"""Share by which friction may be larger than it can before what sticks slides: beyond what rounding decides."""
+
+DRIFTED = 1e-7
+"""Unit of length by which what sticks may move, where what it is connected with seemed to hold it."""
+
+BACK = 1e-8
+"""Speed against the direction of sliding, dimensionless, at which what slides has come to rest."""

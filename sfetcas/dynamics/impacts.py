@@ -9,7 +9,8 @@ where ``e`` is the restitution of each row, and zero of one that opens.  Rows ``
 and after, with impulses of either sign.  Without restitution it is the velocity nearest to ``w`` in the metric of the
 masses ``M`` that all rows allow (Gauss's principle of least constraint).  What is lost, ``1/2 w.M w - 1/2 w+.M w+`` as
 seen from the rows, is not below zero where all ``e`` are alike; where they differ and it would be, the least of them
-counts for all.  Where several rows act the impulses are those of a least-squares problem with bounds.
+counts for all.  Where several rows act the impulses are those of a least-squares problem with bounds.  Where obstacles
+rub there are further impulses along them, see :mod:`~sfetcas.dynamics.rough_impacts`.
 
 Source: Moreau, Unilateral contact and dry friction in finite freedom dynamics, in: Nonsmooth Mechanics and
 Applications, CISM 302 (1988); Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23.
@@ -25,6 +26,7 @@ import numpy as np
 from ..mathematics.arrays import Array, Index
 from ..mechanics.equations import State
 from .integrating import Memory
+from .rough_impacts import Rough, rough_impulses
 from .stages import StageEquations
 
 __all__ = ["Collision", "Impacts"]
@@ -66,7 +68,9 @@ class Collision:
         system, unit = impacts.system, impacts.system.masses.time
         unilateral = system.unilateral
         self._system, self._rows, self._signs = system, unilateral.rows, unilateral.signs
-        self._restitution = unilateral.restitution
+        self._restitution, self._rubbing = unilateral.restitution, system.rubbing
+        # What sticks does so before and after what happens elsewhere, unless an impulse moves it.
+        self._sticks = np.zeros(0, bool) if memory.rubs is None else memory.rubs.sticks > 0.0
         self._state = State(memory.q, memory.y, memory.lam, memory.unwrapped)
         self._factors = system.factors(memory.t)
         rates = [0.0 if history is None else history.rate(memory.t * unit) for history in system.histories]
@@ -84,11 +88,17 @@ class Collision:
     @functools.cached_property
     def _always(self) -> Index:
         """The rows that are on no side."""
-        return np.setdiff1d(np.arange(len(self._jacobian)), self._rows)
+        return np.setdiff1d(np.arange(len(self._jacobian)), self._system.switching)
 
-    def _allowed(self, before: Array) -> Array:
-        """The nearest velocities (unknowns,) under which no row opens or closes that acts."""
+    def _allowed(self, before: Array, still: Array | None = None) -> Array:
+        """The nearest velocities (unknowns,) at which no row opens or closes that acts, and nothing moves that sticks.
+
+        ``still`` (m,) of bool are the places that stick; by default those that do in the state.
+        """
         held = np.concatenate([self._always, self._rows[before]])
+        if self._rubbing is not None:
+            still = self._sticks if still is None else still
+            held = np.concatenate([held, self._rubbing.rows[still & before[self._rubbing.of]].ravel()])
         return self._onto(held, self._momentum[:, None], -self._opening[held])[:, 0]
 
     def speeds(self, before: Array, closes: Array) -> Array:
@@ -99,6 +109,34 @@ class Collision:
             moved = self._jacobian[rows] @ self._allowed(before) + self._opening[rows]
             found[closes] = self._signs[closes] * moved
         return found
+
+    def nearest(self, acting: Array, still: Array | None = None) -> Array:
+        """The nearest velocities (quantities,) that acting rows (rows,) and places that stick (m,), of bool, allow."""
+        return self._velocities(self._allowed(acting, still))
+
+    def independent(self, acting: Array, sticks: Array, pushes: Array) -> Array:
+        """Which rows (m, axes - 1), 1 or 0, hold places that stick, none of which follows from others.
+
+        ``acting`` (rows,) and ``sticks`` (m,) are of bool; rows of places with the largest ``pushes`` (m,) come first.
+        """
+        assert self._rubbing is not None
+        jacobian = self._jacobian / np.maximum(np.linalg.norm(self._jacobian, axis=1), TINY)[:, None]
+        held = np.linalg.svd(jacobian[np.concatenate([self._always, self._rows[acting]])], full_matrices=False)
+        known = list(held[2][held[1] > DEPENDENT])
+        found = np.zeros(self._rubbing.rows.shape)
+        for k in sorted(np.flatnonzero(sticks).tolist(), key=lambda k: -pushes[k]):
+            for i, row in enumerate(self._rubbing.rows[k].tolist()):
+                rest = jacobian[row]
+                for _ in range(2):
+                    rest = rest - sum((one * (one @ rest) for one in known), np.zeros(len(rest)))
+                if (size := float(np.linalg.norm(rest))) > DEPENDENT:
+                    known.append(rest / size)
+                    found[k, i] = 1.0
+        return found
+
+    def _velocities(self, w: Array) -> Array:
+        """Velocities (quantities,) for those of the unknowns in their units."""
+        return self._system.rates_in_time(self._state, self._factors, w * self._unit, self._faster)[1]
 
     def solved(self, before: Array, closes: Array, quiet: Array | None = None) -> tuple[Array, Array, Array, float]:
         """Velocities (quantities,) after the event, impulses, which rows touch then, and the energy that is lost.
@@ -116,16 +154,51 @@ class Collision:
             speed = chosen @ w + self._signs[taking] * self._opening[self._rows[taking]]
             # Rows that act do not move, and what moves so slowly is rounding.
             speed[before[taking] | (np.abs(speed) < SLOW)] = 0.0
+            restitution = np.where(silent, 0.0, self._restitution)[taking]
+            along, rough = self._rough(taking)
+            chosen = np.vstack([chosen, self._jacobian[along]])
             back = self._onto(always, chosen.T, np.zeros(len(always)))
-            found, left, lost, rebound = self._hit(
-                chosen @ back, speed, np.where(silent, 0.0, self._restitution)[taking]
-            )
+            if rough:
+                found, left, lost, rebound = self._rubbed(chosen @ back, speed, w, along, restitution, rough)
+            else:
+                found, left, lost, rebound = self._hit(chosen @ back, speed, restitution)
             w = w - back @ found
+            found = found[: len(taking)]
             impulses[taking] = found
             slow = SLOW * max(1.0, float(np.abs(speed).max()))
             touching[taking] = ((found > 0.0) & (rebound <= slow)) | (left > -slow)
-        _, velocity, _, _ = self._system.rates_in_time(self._state, self._factors, w * self._unit, self._faster)
-        return velocity, impulses, touching, lost
+        return self._velocities(w), impulses, touching, lost
+
+    def _rough(self, taking: Index) -> tuple[Index, list[Rough]]:
+        """Rows along the obstacles that rub, of the unilateral rows that take part, and how they belong together."""
+        if self._rubbing is None:
+            return np.zeros(0, np.intp), []
+        here = np.flatnonzero(np.isin(self._rubbing.of, taking))
+        along, each = self._rubbing.rows[here].ravel(), self._rubbing.rows.shape[1]
+        rough = [
+            Rough(
+                int(np.flatnonzero(taking == self._rubbing.of[k])[0]),
+                len(taking) + each * i + np.arange(each),
+                float(self._rubbing.coefficients[k]),
+            )
+            for i, k in enumerate(here.tolist())
+        ]
+        return along, rough
+
+    def _rubbed(
+        self, yielding: Array, speed: Array, w: Array, along: Index, restitution: Array, rough: list[Rough]
+    ) -> tuple[Array, Array, float, Array]:
+        """As :meth:`_hit` with impulses along rows as well, in the order of ``yielding``."""
+        n = len(speed)
+        slip = self._jacobian[along] @ w + self._opening[along]
+        slip[np.abs(slip) < SLOW] = 0.0
+        # Rows are told by their speeds of closing, but their impulses open them.
+        before = np.concatenate([-speed, slip])
+        signs = np.concatenate([-np.ones(n), np.ones(len(along))])
+        rebound = restitution * np.maximum(speed, 0.0)
+        found, lost, rebound = rough_impulses(signs[:, None] * yielding * signs, before, rebound, rough)
+        found = -signs * found
+        return found, speed - yielding[:n] @ found, lost, rebound
 
     @staticmethod
     def _hit(yielding: Array, speed: Array, restitution: Array) -> tuple[Array, Array, float, Array]:
@@ -186,6 +259,9 @@ LIGHT, MASSLESS, TINY = 1e-6, 1e-12, 1e-300
 """Share of the largest mass below which an unknown keeps it in its unit, and of a unit that counts as no mass; and what
 is divided by instead of zero.
 """
+
+DEPENDENT = 1e-6
+"""Length of what of a row's gradient, of length one, does not follow from others, up to which it follows from them."""
 
 DUAL, REFINED = 1e-12, 3
 """Diagonal of the rows, whose gradients are of length one, and rounds in which what it does is taken out again."""

@@ -12,9 +12,10 @@ import numpy as np
 from .. import tolerances
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array, Index
-from ..mathematics.interpolation import differentiation, evaluation
+from ..mathematics.interpolation import differentiation, evaluation, integration
 from ..mathematics.kernels import Batch
 from ..mechanics.masses import Observables
+from ..mechanics.rubbing import Rubs
 from ..mechanics.segments import pulled_place
 from .methods import Method, Radau
 from .stages import StageEquations
@@ -58,7 +59,9 @@ class Memory:
     held : ndarray
         The values of their rows at which those hold that act: next to zero, unless they began to act late.
     lost : float
-        Energy lost in impacts so far.
+        Energy lost in impacts, and by friction at obstacles, so far.
+    rubs : Rubs or None
+        What the places that rub on obstacles do; None where there are none.
     """
 
     t: float
@@ -74,6 +77,7 @@ class Memory:
     acting: Array = field(default_factory=lambda: np.zeros(0))
     held: Array = field(default_factory=lambda: np.zeros(0))
     lost: float = 0.0
+    rubs: Rubs | None = None
 
     @property
     def position(self) -> Array:
@@ -108,6 +112,8 @@ class Taken:
     iterations : int
     gap : float
         Largest gap of the constraints at its end.
+    rubbed : ndarray (n,)
+        What friction at obstacles has taken away since its begin at :attr:`rubbed_at`; empty where nothing rubs.
     """
 
     begin: Memory
@@ -121,6 +127,12 @@ class Taken:
     size: float
     iterations: int
     gap: float
+    rubbed: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def rubbed_at(self) -> Array:
+        """The stages as fractions of h; where there is but one also the middle."""
+        return self.places if len(self.places) > 1 else np.array([0.5, 1.0])
 
     @property
     def converged(self) -> bool:
@@ -181,8 +193,9 @@ class Stepper:
         turns = np.zeros((stages, n.rotations, system.turns)) if last is None else last.turns
         shifts = np.zeros((stages, n.y)) if last is None else last.shifts
         ratio = np.array([0.0 if last is None else h / last.h])
+        rubs = [] if memory.rubs is None else [memory.rubs.flat]
         counted = np.concatenate(
-            [memory.unwrapped, memory.remembered[: system.memory.size], memory.acting, memory.held]
+            [memory.unwrapped, memory.remembered[: system.memory.size], *rubs, memory.acting, memory.held]
         )
         given = (memory.q, memory.y, memory.lam, turns, shifts, memory.x, memory.rates)
         for i, values in enumerate((*given, ratio, np.array([h]), factors, counted)):
@@ -214,7 +227,35 @@ class Stepper:
         change = float(size[0]) if np.isfinite(x).all() else np.inf
         parts = turns.reshape(stages, n.rotations, -1), shifts.reshape(stages, n.y), x, lam
         taken = Taken(memory, after, h, method.places, *parts, change, int(np.nan_to_num(iterations[0])), float(gap[0]))
-        return self._nearby(replace(taken, after=replace(after, last=taken)))
+        if memory.rubs is not None and np.isfinite(change):
+            taken = self._rubbed(taken, memory.rubs)
+        return self._nearby(replace(taken, after=replace(taken.after, last=taken)))
+
+    def _rubbed(self, taken: Taken, rubs: Rubs) -> Taken:
+        """The step with what friction took, and with the directions of sliding at its end."""
+        rubbing, method, begin = self.system.rubbing, self.method, taken.begin
+        assert rubbing is not None
+        end = rubbing.of_quantities(taken.after.rates[0])
+        if not rubs.slides.any():
+            taken = replace(taken, rubbed=np.zeros(len(taken.rubbed_at)))
+        elif method.stages == 1:
+            ends = (begin.y, begin.rates[0], begin.lam), (taken.after.y, taken.after.rates[0], taken.after.lam)
+            first, last = (
+                rubbing.power(rubs, rubbing.displacements(y), rubbing.of_quantities(v), lam) for y, v, lam in ends
+            )
+            # The power is taken to be linear in time.
+            taken = replace(taken, rubbed=taken.h * np.array([0.375 * first + 0.125 * last, 0.5 * (first + last)]))
+        else:
+            nodes = np.array([0.0, *method.places])
+            v = (differentiation(nodes) @ np.vstack([begin.x, taken.x]))[1:] / taken.h
+            powers = [
+                rubbing.power(rubs, rubbing.displacements(begin.y + shift), rubbing.of_quantities(rate), lam)
+                for shift, rate, lam in zip(taken.shifts, v, taken.lam, strict=True)
+            ]
+            taken = replace(taken, rubbed=taken.h * integration(method.places, method.places) @ powers)
+        ways, _ = rubbing.directions(rubbing.displacements(taken.after.y), end, rubs.ways)
+        after = replace(taken.after, lost=begin.lost + float(taken.rubbed[-1]), rubs=replace(rubs, ways=ways))
+        return replace(taken, after=after)
 
     def _nearby(self, taken: Taken) -> Taken:
         """The step counted from places near what flies freely."""

@@ -146,7 +146,10 @@ class Stages(Integrator):
         rates[0] = begun.v
         begin = self.system.memory.begun
         given = state.q, state.y, state.lam, begun.x, rates, state.unwrapped
-        memory = Memory(0.0, *given, remembered=begin, acting=begun.touching, held=0.0 * begun.touching)
+        rubbing = self.system.rubbing
+        rubs = None if rubbing is None else rubbing.idle(rubbing.displacements(state.y))
+        still = 0.0 * begun.touching
+        memory = Memory(0.0, *given, remembered=begin, acting=begun.touching, held=still, rubs=rubs)
         self._sampler, self.record = Sampler(course.times, method.stages), StepRecord(method.stages)
         first = None if course.step is not None else max(FIRST * course.end, min(course.end, SHORTEST))
         late = LATE * course.accuracy * course.size * 0.5**course.rounds

@@ -27,6 +27,7 @@ from ..mechanics.memory import Remembering
 from ..mechanics.model import Model, assemble
 from ..solvers.redundancy import loose_rows
 from ..solvers.sharing import shared
+from .friction import pushed_along, rubbed
 from .projecting import factor_closings
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ class Mover:
         scales, part = self.model.scales, self.unilateral.parts[event.row]
         turns = part.table == "springs" and self.model.scene.springs[part.name].type == "rotational"
         side = "taut" if part.table == "tendons" else part.side
+        side = "sticking" if event.sticks else side
         impulse = event.impulse * (scales.moment if turns else scales.force) * self.time
         where = self.unilateral.names[event.row]
         lost, spot = event.lost * scales.moment, part.spot
@@ -77,6 +79,10 @@ class Mover:
         point = equations.at(free, loading)
         forces = self.inertia.forces(sample.v, sample.a)
         balanced = self.inertia.loading(equations, free, equations.effective(free, loading), forces)
+        friction = np.zeros((0, 0))
+        if system.rubbing is not None and sample.rubs is not None:
+            friction = rubbed(system.rubbing, equations, free, balanced, sample)
+            balanced = pushed_along(system.rubbing, balanced, friction)
         state = self._balanced(equations, free, balanced)
         fields = Fields(equations, state, balanced)
         kinetic = self.inertia.kinetic(sample.v)
@@ -90,7 +96,20 @@ class Mover:
             sample=sample,
             energies=(kinetic, point.strain, point.potential - point.strain - fields.spent / model.scales.moment),
             mover=self,
+            friction=self._friction(friction, sample),
         )
+
+    def _friction(self, forces: Array, sample: Sample) -> dict[str, tuple[Array, bool]]:
+        """Of places that stick or slide, by the names of their rows, forces (3,) along obstacles, N, and which do."""
+        rubbing, rubs = self.inertia.system.rubbing, sample.rubs
+        if rubbing is None or rubs is None:
+            return {}
+        found = {}
+        for k in np.flatnonzero(rubs.sticks + rubs.slides).tolist():
+            spot = self.unilateral.parts[rubbing.of[k]].spot
+            assert spot is not None
+            found[spot.name] = three(forces[k]) * self.model.scales.force, bool(rubs.sticks[k])
+        return found
 
     def acting(self, acting: Array) -> Equations:
         """The equations of the model in which unilateral constraints act as told, (rows,), 1 or 0."""
@@ -131,6 +150,9 @@ class MotionState(Configuration):
         Rotations, displacements and their rates, dimensionless.
     energies : tuple of float
         Kinetic energy, elastic energy, potential of the loads, dimensionless; :attr:`energy` has them in N m.
+    friction : mapping
+        For the row of each place that touches an obstacle with friction the force (3,) along it on the member, N, and
+        whether it sticks.
     """
 
     where: ClassVar[str] = MOTION
@@ -139,6 +161,7 @@ class MotionState(Configuration):
     sample: Sample = field(repr=False)
     energies: tuple[float, float, float] = field(repr=False)
     mover: Mover = field(repr=False)
+    friction: Mapping[str, tuple[Array, bool]] = field(repr=False, default_factory=dict)
 
     def __repr__(self) -> str:
         energy = ", ".join(f"{kind} {number_in_words(value)}" for kind, value in self.energy.items())
@@ -182,8 +205,8 @@ class MotionState(Configuration):
         """``kinetic`` and ``elastic`` energy, potential of the present ``loads``, and their sum ``total``, N m.
 
         ``loads`` is minus the present forces times displacements, so that the sum also changes while loads change.
-        Where laws have memory, tendons may be slack or springs have stops also what is ``dissipated``, in impacts and
-        otherwise, which the total does not have.
+        Where laws have memory, tendons may be slack, springs have stops or members touch obstacles also what is
+        ``dissipated``, in impacts, by friction and otherwise, which the total does not have.
         """
         kinetic, elastic, loads = (part * self.model.scales.moment for part in self.energies)
         lost, spent = dict[str, float](), self.fields.dissipated
@@ -203,7 +226,9 @@ class MotionState(Configuration):
         """For each obstacle of the scene: ``force`` (3,) N on all members, ``gap`` m, and what is ``touching``.
 
         The gap is the smallest distance of a member, below zero where one dips in between ends of elements.  Nodes are
-        told as ``nodes.tip``, members with the fraction of their length: ``members.rod at 0.25``.
+        told as ``nodes.tip``, members with the fraction of their length: ``members.rod at 0.25``.  Of one with friction
+        also ``friction`` (3,) N, the part of the force that is along it, and what is ``sticking``; what else touches
+        slides.
         """
         model, scene = self.model, self.model.scene
         if not scene.contacts:
@@ -211,15 +236,23 @@ class MotionState(Configuration):
         touched, found = Touched.of(self.fields), dict[str, dict[str, Any]]()
         for name in scene.contacts:
             force = sum((force for _, _, force in self.pushes(name)), np.zeros(3))
-            touching = [spot.where for spot in model.mesh.spots or () if spot.contact == name]
+            spots = [spot for spot in model.mesh.spots or () if spot.contact == name]
+            touching = [spot.where for spot in spots]
             found[name] = {"force": force, "gap": touched.smallest_gap(name, {}), "touching": touching}
+            if scene.contacts[name].friction:
+                rubbed = [(spot.where, *self.friction[spot.name]) for spot in spots if spot.name in self.friction]
+                found[name]["friction"] = sum((force for _, force, _ in rubbed), np.zeros(3))
+                found[name]["sticking"] = [where for where, _, sticks in rubbed if sticks]
         return found
 
     def pushes(self, contact: str) -> list[tuple[str, float, Array]]:
         """As of :meth:`.Configuration.pushes`, at each place where the obstacle stops a member."""
         spots = [spot for spot in self.model.mesh.spots or () if spot.contact == contact]
         touched = Touched.of(self.fields)
-        return [(spot.member, spot.at, touched.push_at(spot)) for spot in spots]
+        nothing = np.zeros(3), False
+        return [
+            (spot.member, spot.at, touched.push_at(spot) + self.friction.get(spot.name, nothing)[0]) for spot in spots
+        ]
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
         """As :meth:`.Configuration.table`; also for the kinds ``energy`` and ``momentum``."""
@@ -250,12 +283,13 @@ class StopEvent:
     name : str
         ``tendons.NAME``, ``springs.NAME`` or ``contacts.NAME``.
     side : str
-        ``taut`` of a tendon; ``low`` or ``high`` of a stop; ``touching`` of an obstacle.
+        ``taut`` of a tendon; ``low`` or ``high`` of a stop; ``touching`` or ``sticking`` of an obstacle.
     acts : bool
-        Whether the tendon is taut, the spring at its stop, or the member at the obstacle, from then on.
+        Whether from then on the tendon is taut, the spring at its stop, the member at the obstacle, or held by its
+        friction.
     impulse : float
-        Of the tension, the stop or the obstacle, not below zero, N s; N m s of a stop of an angle; zero where nothing
-        hits.
+        Of the tension, the stop or across the obstacle, not below zero, N s; N m s of a stop of an angle; zero where
+        nothing hits.
     dissipated : float
         The energy that all impulses of that time dissipate, J, at the largest of them; else zero.
     turns : bool
@@ -280,7 +314,9 @@ class StopEvent:
             what = "taut" if self.acts else "slack"
         elif self.where:
             left = "hits it and leaves" if self.impulse else "leaves it"
+            sticks = self.side == "sticking"
             what = f"{self.where} {'touches it' if self.acts else left}"
+            what = f"{self.where} {'sticks' if self.acts else 'slides'}" if sticks else what
         hit = f", after an impulse of {number_in_words(self.impulse, unit)}" if self.impulse else ""
         lost = f", {number_in_words(self.dissipated, 'N m')} dissipated" if self.dissipated else ""
         return f"{when}: {what}{hit}{lost}"

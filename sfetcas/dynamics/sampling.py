@@ -17,6 +17,7 @@ from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, unit
 from ..mathematics.interpolation import differentiation, evaluation
+from ..mechanics.rubbing import Rubs
 from .integrating import Memory, Taken
 
 __all__ = ["Sample", "Sampler", "StepRecord", "between", "turned_by"]
@@ -54,7 +55,9 @@ class Sample:
     acting : ndarray
         Which unilateral constraints act, see :class:`~sfetcas.dynamics.integrating.Memory`.
     lost : float
-        Energy lost in impacts so far.
+        Energy lost in impacts, and by friction at obstacles, so far.
+    rubs : Rubs or None
+        What the places that rub on obstacles do, and the directions of sliding a little earlier.
     """
 
     t: float
@@ -68,6 +71,7 @@ class Sample:
     remembered: Array = field(default_factory=lambda: np.zeros(0))
     acting: Array = field(default_factory=lambda: np.zeros(0))
     lost: float = 0.0
+    rubs: Rubs | None = None
 
 
 class Sampler:
@@ -243,9 +247,17 @@ def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -
     near = np.delete(np.arange(len(at)), int(np.abs(at - here).argmax()))
     doubt = np.abs(a - _rates(at[near], here, quantities[near])[1]).max(initial=0.0) if len(at) > 2 else 0.0
     position = middle + (row @ quantities)[0]
-    given = own.after.unwrapped, begin.remembered, begin.acting, begin.lost
+    given = own.after.unwrapped, begin.remembered, begin.acting, begin.lost + _rubbed(own, float(here[0])), begin.rubs
     sample = Sample(t, q, (row @ np.array(y))[0], position, v / h, a / h**2, spin, *given)
     return sample, float(doubt) / h**2
+
+
+def _rubbed(taken: Taken, share: float) -> float:
+    """What friction at obstacles has taken away in a share of a step."""
+    if not len(taken.rubbed):
+        return 0.0
+    row = evaluation(np.array([0.0, *taken.rubbed_at]), np.array([np.clip(share, 0.0, 1.0)]))[0]
+    return float(row[1:] @ taken.rubbed)
 
 
 def _rates(at: Array, here: Array, values: Array) -> tuple[Array, Array]:
@@ -264,7 +276,7 @@ def between(samples: Sequence[Sample], t: float) -> Sample:
         return np.tensordot(row, np.array([getattr(sample, part) for sample in samples]), 1)
 
     q = turned_by(near.q, np.einsum("n,nra->ra", row, turns))
-    given = near.unwrapped, near.remembered, near.acting, near.lost
+    given = near.unwrapped, near.remembered, near.acting, near.lost, near.rubs
     return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), mean("spin"), *given)
 
 

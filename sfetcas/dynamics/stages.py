@@ -54,7 +54,10 @@ class StageEquations(System):
         x = ca.horzcat(*[self.moving(parts[i], y[:, i], given[i], unwrapped) - x0 for i in range(stages)])
         rates, accelerations = ca.mtimes(x, c.T) + v, ca.mtimes(x, b.T) + a
         forces = self.forces(rates, accelerations)
-        found = [_Stage(self, parts[i], y[:, i], lam[:, i], forces[:, i], given[i], unwrapped) for i in range(stages)]
+        found = [
+            _Stage(self, parts[i], y[:, i], lam[:, i], forces[:, i], given[i], unwrapped, rates[:, i])
+            for i in range(stages)
+        ]
         entries = [stage.entries for stage in found]
         for i, one in enumerate(found):
             entries += [one.coupled(other, c[i, j], b[i, j]) for j, other in enumerate(found)]
@@ -78,7 +81,7 @@ class StageEquations(System):
         system = self._system(stages)
         dual = [-DUAL_REGULARISATION / part for part in inertia]
         if len(self.unilateral):
-            dual += [-(1.0 - self.acting(unwrapped)) / (DUAL_REGULARISATION * part) for part in inertia]
+            dual += [-(1.0 - self.switches(unwrapped)) / (DUAL_REGULARISATION * part) for part in inertia]
         matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries, *dual)))
         left = ca.vec(residual.T)
         found = self._eliminated(matrix, left[system.order], stages)
@@ -150,7 +153,7 @@ class StageEquations(System):
         rows = np.arange(self.equations.unknowns, self.total)
         blocks += [(i, i, (rows, rows, np.ones(len(rows)), np.zeros(len(rows), np.intp)), 1) for i in range(stages)]
         if len(self.unilateral):
-            own = self.equations.unknowns + self.unilateral.rows
+            own = self.equations.unknowns + self.switching
             blocks += [(i, i, (own, own, np.ones(len(own)), np.arange(len(own))), len(own)) for i in range(stages)]
         size, first, flat, weights, entries = self.total * stages, 0, [], [], []
         for i, j, (r, c, weight, number), count in blocks:
@@ -200,6 +203,11 @@ class StagePlaces:
         for matrix in (system.place_mass, system.place_drag):
             row, column = places_of(matrix.sparsity())
             coupled.add(system.of_places + row, system.of_places + column)
+        if (rubbing := system.rubbing) is not None:
+            rubbed = tables.place_cells(rubbing.places)
+            static.add(rubbed[:, None, :], rubbed[:, :, None])
+            static.add(rubbed, tables.of_rows + rubbing.gaps[:, None])
+            coupled.add(rubbed[:, None, :], rubbed[:, :, None])
         if system.crossing is None:
             return
         for sides in system.observed:
@@ -216,7 +224,15 @@ class _Stage:
     """Residual and entries of one stage at given inertia and damping forces."""
 
     def __init__(
-        self, system: StageEquations, q: ca.MX, y: ca.MX, lam: ca.MX, forces: ca.MX, given: Given, unwrapped: ca.MX
+        self,
+        system: StageEquations,
+        q: ca.MX,
+        y: ca.MX,
+        lam: ca.MX,
+        forces: ca.MX,
+        given: Given,
+        unwrapped: ca.MX,
+        rates: ca.MX | None = None,
     ) -> None:
         self._system = system
         lam = system.switched(lam, unwrapped)
@@ -237,6 +253,12 @@ class _Stage:
             shares.append((sides, found[3]))
             entries.append(ca.vec(found[4]))
             self._rotation_jacobians.append(found[5])
+        if system.rubbing is not None:
+            velocities = ca.MX.zeros(places.shape) if rates is None else rates[: places.shape[0]]
+            rubbed = system.rubbing.forces(places, lam, system.rubs(unwrapped), velocities)
+            shares.append((system.tables.place_cells(system.rubbing.places), rubbed[0]))
+            entries += [ca.vec(rubbed[1]), ca.vec(rubbed[2])]
+            self._rubbed_by_rates = ca.vec(rubbed[3])
         self.residual = static.gathered(shares)
         if len(system.unilateral):
             n = system.equations.unknowns
@@ -255,6 +277,8 @@ class _Stage:
         if len(system.massive):
             entries += system.hung(self._rotation_jacobian, other._rotation_jacobian, c, b)
         entries += [b * system.place_mass.nz[:], c * system.place_drag.nz[:]]
+        if system.rubbing is not None:
+            entries.append(c * self._rubbed_by_rates)
         if system.crossing is not None:
             entries += self._turning(other, c)
         return ca.vertcat(*entries)

@@ -27,6 +27,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.masses import Masses, Observables
 from ..mechanics.memory import Remembering
 from ..mechanics.model import Model
+from ..mechanics.rubbing import rubbing_of
 from ..mechanics.singles import arms_product, weighted_product
 from ..mechanics.terms import rows_of
 from ..mechanics.unilateral import NONE, UnilateralRows
@@ -75,7 +76,7 @@ class System(Expressions):
             raise ValueError("motion needs the nodal assembly on a mesh with a place at every cut")
         self.masses, self.memory = masses, Remembering(self.model)
         self._memory = {number: (group, part) for number, group, part in self.memory.parts()}
-        self.unilateral = unilateral
+        self.unilateral, self.rubbing = unilateral, rubbing_of(self.model, unilateral)
         self.observed = [self.tables.sides_of(group) for group in masses.observables]
         self._place()
         self._weigh()
@@ -140,14 +141,17 @@ class System(Expressions):
         sizes = [group.kind.sizes[2] * len(group.data) for group in masses.observables]
         bounds = np.cumsum([self.linear, *sizes]).tolist()
         self.ranges = list(zip(bounds, bounds[1:], strict=False))
-        # What members remember, and which unilateral constraints act and where, is given with the angles that count
-        # turns, and changes as seldom.
+        # What members remember, what sticks and slides, and which unilateral constraints act and where, is given with
+        # the angles that count turns, and changes as seldom.
         given = self.layout.unwrapped + self.memory.size + 2 * len(self.unilateral)
+        given += 0 if self.rubbing is None else self.rubbing.size
         self.layout = Layout(**{**vars(self.layout), "unwrapped": given}, x=bounds[-1])
 
     def data(self, number: int, given: Given, unwrapped: ca.MX) -> ca.MX:
         """As of :meth:`.SymbolicTerms.data`, with what members remember from behind the angles in ``unwrapped``."""
         data, angles = super().data(number, given, unwrapped), self.model.unwrapping.count
+        if self.rubbing is not None and number == self.rubbing.group:
+            return self.rubbing.parts(self.rubs(unwrapped))[3]
         if number - 1 not in self._memory:
             return data
         group, part = self._memory[number - 1]
@@ -159,11 +163,31 @@ class System(Expressions):
     def counted(self, state: State, acting: Array | None = None) -> Array:
         """The angles that count turns in a state, what members remember at the begin, which unilateral constraints act.
 
-        By default all do, and hold at zero.
+        By default all do, and hold at zero.  What rubs does not slide.
         """
-        count = len(self.unilateral)
+        count, rubbing = len(self.unilateral), self.rubbing
         acting = np.ones(count) if acting is None else acting
-        return np.concatenate([state.unwrapped, self.memory.begun[: self.memory.size], acting, np.zeros(count)])
+        rubs = np.zeros(0) if rubbing is None else rubbing.idle(rubbing.displacements(state.y)).flat
+        return np.concatenate([state.unwrapped, self.memory.begun[: self.memory.size], rubs, acting, np.zeros(count)])
+
+    def rubs(self, unwrapped: ca.MX) -> ca.MX:
+        """What the places that rub do, as :attr:`.Rubs.flat`."""
+        assert self.rubbing is not None
+        end = self.layout.unwrapped - 2 * len(self.unilateral)
+        return unwrapped[end - self.rubbing.size : end]
+
+    @functools.cached_property
+    def switching(self) -> Index:
+        """Numbers of the rows that act at times: unilateral ones, then those that hold what sticks."""
+        rows = self.unilateral.rows
+        return rows if self.rubbing is None else np.concatenate([rows, self.rubbing.rows.ravel()])
+
+    def switches(self, unwrapped: ca.MX) -> ca.MX:
+        """For each row of :attr:`switching` whether it acts, 1 or 0."""
+        acting = self.acting(unwrapped)
+        if self.rubbing is None:
+            return acting
+        return ca.vertcat(acting, self.rubbing.parts(self.rubs(unwrapped))[1])
 
     def switched(self, rows: ca.MX, unwrapped: ca.MX) -> ca.MX:
         """Multipliers of the rows (rows,), zero where a unilateral constraint does not act."""
@@ -171,7 +195,7 @@ class System(Expressions):
         if not count:
             return rows
         acting = ca.MX.ones(self.layout.lam)
-        acting[self.unilateral.rows.tolist()] = self.acting(unwrapped)
+        acting[self.switching.tolist()] = self.switches(unwrapped)
         return rows * acting
 
     def missed(self, rows: ca.MX, unwrapped: ca.MX) -> ca.MX:

@@ -24,6 +24,8 @@ from .contact_joints import (
     OnEdge,
     OnPlane,
     OnRound,
+    Sticking,
+    directions_along,
 )
 from .elements import Element
 from .joints import (
@@ -255,6 +257,8 @@ class _Toucher:
             yield self._cushioned(cushion)
         for spot in self.mesh.spots or ():
             yield self._stopped(spot)
+            if spot.rubs:
+                yield self._sticking(spot)
 
     def place(self, touch: Touch, at: float) -> int:
         """Number of the place of a touch."""
@@ -287,6 +291,15 @@ class _Toucher:
         data = self._flat(stop, start, 0.0) if flat else self._round(stop, start, 0.0)
         kind = OnPlane(space) if flat else OnRound(space)
         return One(kind, spot.contact, "", data, (), (self.segments.place(spot.place),), spot.name)
+
+    def _sticking(self, spot: Spot) -> One:
+        """A place that an obstacle holds along it: in the undeformed scene, or where a motion says."""
+        axes, line, x = self.element.axes, self.scene.center_lines[spot.member], np.array([spot.at])
+        stop = obstacle(self.scene.contacts[spot.contact], self.element.space)
+        normal = stop.normals(line.positions(x), line.tangents(x))[0, :axes]
+        data = np.append(directions_along(normal), np.zeros((axes - 1, 1)), axis=1).ravel()
+        place = (self.segments.place(spot.place),)
+        return One(Sticking(self.element.space), spot.contact, "", data, (), place, spot.along)
 
     def _flat(self, stop: Obstacle, start: Array, offset: float) -> Array:
         """Data of a place on a plane; ``start`` is where it begins, from the obstacle's place, m."""

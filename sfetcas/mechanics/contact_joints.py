@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from typing import ClassVar, final
 
 import casadi as ca
+import numpy as np
 
+from ..mathematics.arrays import Array
 from .terms import Side, Term
 
 __all__ = [
@@ -21,6 +23,8 @@ __all__ = [
     "OnEdge",
     "OnPlane",
     "OnRound",
+    "Sticking",
+    "directions_along",
 ]
 
 CENTRE = 1e-60
@@ -63,6 +67,28 @@ class OnRound(Term):
 
 @final
 @dataclass(frozen=True)
+class Sticking(Term):
+    """Constraint: a place does not move along an obstacle; data: for each direction along it, a unit vector and the
+    displacement that it keeps.
+    """
+
+    along_face: ClassVar[bool] = True
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row in the plane, two in space."""
+        count = self.axes - 1
+        return 0, 1, count, count * (self.axes + 1), 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """How far it is from where it is to stay."""
+        n = self.axes
+        parts = [data[k * (n + 1) : (k + 1) * (n + 1)] for k in range(n - 1)]
+        return [ca.dot(part[:n], ca.vertcat(*u[0])) - part[n] for part in parts]
+
+
+@final
+@dataclass(frozen=True)
 class CushionedPlane(Term):
     """Penalty contact of a place with a plane; data: those of :class:`OnPlane`, stiffness, thickness."""
 
@@ -89,6 +115,15 @@ class CushionedRound(Term):
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """Penalty energy."""
         return _cushion(_gap_of_round(u[0], data), data[self.axes * self.axes + self.axes + 2 :])
+
+
+def directions_along(normal: Array) -> Array:
+    """Unit vectors (axes - 1, axes) across a unit normal (axes,) and each other."""
+    if len(normal) == 2:
+        return np.array([[-normal[1], normal[0]]])
+    first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+    first = first / np.linalg.norm(first)
+    return np.array([first, np.cross(normal, first)])
 
 
 def _gap_of_plane(u: Side, data: ca.SX) -> ca.SX:

@@ -27,6 +27,7 @@ __all__ = [
     "Remembered",
     "Spot",
     "Touch",
+    "Vector",
     "breaks_of",
     "cut",
     "first_mesh",
@@ -192,17 +193,25 @@ class Spot:
         Fraction of the length of the member.
     place : str
         Name of the place among those of the model: of the node, or of the end of elements.
+    rubs : bool
+        Whether the model also has rows that hold it along the obstacle.
     """
 
     contact: str
     member: str
     at: float
     place: str
+    rubs: bool = False
 
     @property
     def name(self) -> str:
         """Name of its constraint row."""
         return f"contacts.{self.contact} at {self.place}"
+
+    @property
+    def along(self) -> str:
+        """Name of the rows that hold it along the obstacle."""
+        return f"{self.name} along it"
 
     @property
     def where(self) -> str:

@@ -34,7 +34,7 @@ def spots_of(scene: Scene, mesh: Mesh) -> tuple[Spot, ...]:
         stop = obstacle(record, space)
         for member in members_of(record, scene.members):
             for at, place in _places(scene, mesh, member, stop):
-                found.setdefault((contact, place), Spot(contact, member, at, place))
+                found.setdefault((contact, place), Spot(contact, member, at, place, rubs=record.friction > 0.0))
     return tuple(found.values())
 
 

@@ -121,6 +121,9 @@ class Term(Components, abc.ABC):
     on_face: ClassVar[bool] = False
     """Whether its row keeps a place on the surface of an obstacle."""
 
+    along_face: ClassVar[bool] = False
+    """Whether its rows keep a place from moving along the surface of an obstacle."""
+
     looks_up: ClassVar[bool] = False
     """Whether it has tables in it, among which it would take long to look for what is the same."""
 

@@ -122,7 +122,8 @@ class UnilateralRows:
         """The mesh of the choice in which those are active whose number in ``acting`` (n,) is not zero."""
         pairs = list(zip(self.parts, (acting != 0.0).tolist(), strict=True))
         stops = tuple(part.entry for part, now in pairs if part.spot is None and now != (part.side == "slack"))
-        spots = tuple(part.spot for part, now in pairs if part.spot is not None and now)
+        # Forces along obstacles are loads there.
+        spots = tuple(replace(part.spot, rubs=False) for part, now in pairs if part.spot is not None and now)
         return replace(mesh, stops=stops, spots=None if mesh.spots is None else spots)
 
     def acting(self, stops: Stops) -> Array:
