@@ -6,7 +6,7 @@ when they began to touch: between the two states that is in the ratio of the gap
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,9 +15,9 @@ from ..description.scene import Scene
 from ..mathematics.arrays import Array, unit
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Grip, Vector
-from .closest import Closest
+from .closest import Closest, Near
 
-__all__ = ["FIRM", "Gripping"]
+__all__ = ["FIRM", "Gripping", "Placed"]
 
 CENTRED = 1e-4
 """Angle, rad, and share of the size of the scene, by which a point may have moved from where friction is set up there:
@@ -30,6 +30,33 @@ the last what is new sticks, all else has the first.
 """
 
 
+class Placed:
+    """Where points are in a state: all of a member at once.
+
+    Attributes
+    ----------
+    places, tangents : list of list of ndarray (3,)
+        Of each point positions, m, and unit tangents of its members.
+    vectors : list of ndarray (3,)
+        From the second centre line, or the obstacle, to the first, m.
+    """
+
+    def __init__(self, scene: Scene, fields: Fields, points: Sequence[ContactPoint | Near]) -> None:
+        sides = [(i, side) for i, point in enumerate(points) for side in range(len(point.members))]
+        self.places: list[list[Array]] = [[np.zeros(3)] * len(point.members) for point in points]
+        self.tangents: list[list[Array]] = [[np.zeros(3)] * len(point.members) for point in points]
+        for member in {member for point in points for member in point.members}:
+            chosen = [(i, side) for i, side in sides if points[i].members[side] == member]
+            at = np.array([points[i].at[side] for i, side in chosen])
+            found = zip(chosen, fields.positions(member, at), fields.tangents(member, at), strict=True)
+            for (i, side), place, tangent in found:
+                self.places[i][side], self.tangents[i][side] = place, tangent
+        self.vectors = [
+            here[0] - (here[1] if len(here) == 2 else scene.obstacles[point.contact].place)
+            for here, point in zip(self.places, points, strict=True)
+        ]
+
+
 @dataclass(eq=False)
 class Gripping:
     """Friction of a scene on a way.
@@ -38,8 +65,6 @@ class Gripping:
     ----------
     scene : Scene
     closest : Closest
-    vector : callable
-        (fields, point) -> the vector (3,) of a point, m.
     since : Fields or None
         The last state of the way; None where there is none, so that nothing has slipped.
     firm : float
@@ -48,7 +73,6 @@ class Gripping:
 
     scene: Scene
     closest: Closest
-    vector: Callable[[Fields, ContactPoint], Array]
     since: Fields | None = None
     firm: float = FIRM[0]
 
@@ -56,20 +80,25 @@ class Gripping:
         """Take the next of the numbers that Newton's method depends on."""
         self.firm = FIRM[(FIRM.index(self.firm) + 1) % len(FIRM)]
 
-    def set_up(self, fields: Fields, point: ContactPoint) -> ContactPoint:
-        """A point with its friction where it is now."""
+    def set_up(self, fields: Fields, points: Sequence[ContactPoint]) -> tuple[ContactPoint, ...]:
+        """Points with their friction where they are now."""
+        if not self.scene.rubs:
+            return tuple(points)
+        now = Placed(self.scene, fields, points)
+        before = now if self.since is None else Placed(self.scene, self.since, points)
+        return tuple(self._set_up(fields, point, i, now, before) for i, point in enumerate(points))
+
+    def _set_up(self, fields: Fields, point: ContactPoint, i: int, now: Placed, before: Placed) -> ContactPoint:
         coefficient = self.scene.contacts[point.contact].friction
         if not coefficient:
             return point
-        since = fields if self.since is None else self.since
-        normal, now = self._normal(fields, point), self._tangents(fields, point)
-        apart = self.vector(since, point)
+        normal, vector, apart = self._normal(point, i, now), now.vectors[i], before.vectors[i]
         if point.grip is None or self.since is None:
             # The share of the way to this state after which they touched.
             distance = self.closest.pairs[point.pair].distance
-            begin, end = (float(normal @ vector) - distance for vector in (apart, self.vector(fields, point)))
+            begin, end = float(normal @ apart) - distance, float(normal @ vector) - distance
             share = float(np.clip(begin / (begin - end), 0.0, 1.0)) if begin > end else 0.0
-            touched = share * (self.vector(fields, point) - apart)
+            touched = share * (vector - apart)
         else:
             touched, share = np.array(point.grip.touched), point.grip.share
         return replace(
@@ -77,10 +106,10 @@ class Gripping:
             grip=Grip(
                 coefficient,
                 self.firm or (0.0 if point.new else FIRM[0]),
-                tuple(_told(way) for way in _across(normal, np.array(now[0]), fields.model.space)),
+                tuple(_told(way) for way in _across(normal, now.tangents[i][0], fields.model.space)),
                 _told(apart + touched),
-                self._tangents(since, point),
-                now,
+                tuple(map(_told, before.tangents[i])),
+                tuple(map(_told, now.tangents[i])),
                 _told(touched),
                 share,
             ),
@@ -103,31 +132,27 @@ class Gripping:
             else replace(point, grip=replace(point.grip, touched=(0.0, 0.0, 0.0), share=0.0))
         )
 
-    def off_centre(self, fields: Fields, point: ContactPoint, now: ContactPoint) -> bool:
+    def off_centre(self, fields: Fields, points: Sequence[ContactPoint], now: Sequence[ContactPoint]) -> bool:
         """Whether a point has moved so far that friction has to be set up again where it is."""
-        if point.grip is None:
+        if not any(point.grip for point in points):
             return False
+        placed = Placed(self.scene, fields, now)
+        return any(self._off(i, point, now[i], placed) for i, point in enumerate(points) if point.grip)
+
+    def _off(self, i: int, point: ContactPoint, now: ContactPoint, placed: Placed) -> bool:
+        assert point.grip is not None
         lengths = [self.closest.lengths[member] for member in point.members]
         along = max(abs(a - b) * size for a, b, size in zip(point.at, now.at, lengths, strict=True))
-        turned = np.abs(np.array(point.grip.frame) @ self._normal(fields, now)).max()
-        tangents = np.array(self._tangents(fields, now)) - np.array(point.grip.now)
-        return bool(
-            along > CENTRED * self.scene.size or turned > CENTRED or np.abs(tangents).max(initial=0.0) > CENTRED
-        )
+        turned = np.abs(np.array(point.grip.frame) @ self._normal(now, i, placed)).max()
+        tangents = np.abs(np.array(placed.tangents[i]) - np.array(point.grip.now)).max()
+        return bool(along > CENTRED * self.scene.size or turned > CENTRED or tangents > CENTRED)
 
-    def _normal(self, fields: Fields, point: ContactPoint) -> Array:
+    def _normal(self, point: ContactPoint, i: int, placed: Placed) -> Array:
         """Unit normal (3,) at a point."""
-        pair = self.closest.pairs[point.pair]
-        if pair.stop is None:
-            return unit(self.vector(fields, point))
-        (member,), at = point.members, np.array(point.at)
-        return np.asarray(pair.stop.normals(fields.positions(member, at), fields.tangents(member, at))[0])
-
-    @staticmethod
-    def _tangents(fields: Fields, point: ContactPoint) -> tuple[Vector, ...]:
-        """Unit tangents of the members at a point."""
-        pairs = zip(point.members, point.at, strict=True)
-        return tuple(_told(fields.tangents(member, np.array([at]))[0]) for member, at in pairs)
+        stop = self.closest.pairs[point.pair].stop
+        if stop is None:
+            return unit(placed.vectors[i])
+        return np.asarray(stop.normals(placed.places[i][0][None], placed.tangents[i][0][None])[0])
 
 
 def _across(normal: Array, tangent: Array, space: bool) -> list[Array]:

@@ -20,7 +20,7 @@ from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mechanics.accuracy import roughness
-from ..mechanics.contact_points import undeformed_distance
+from ..mechanics.contact_points import undeformed_vectors
 from ..mechanics.equations import State
 from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
@@ -31,7 +31,7 @@ from ..solvers.continuation import JUMPED, near_factor
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
 from .closest import Closest, Near, Pair, PairKey
-from .gripping import FIRM, Gripping
+from .gripping import FIRM, Gripping, Placed
 
 __all__ = ["MemberContact"]
 
@@ -138,7 +138,7 @@ class MemberContact:
         radii = min((pair.distance for pair in self.closest.pairs.values() if pair.stop is None), default=np.inf)
         self.tolerance = min(max(0.1 * accuracy, tolerances.CLOSED) * scene.size, ALLOWED * radii)
         self.leaves = scene.analysis.unstable == "leave"
-        self.gripping = Gripping(scene, self.closest, self._vector)
+        self.gripping = Gripping(scene, self.closest)
         self.stride, self.first, self.rough, self.finer = STRIDE, FIRST, ROUGH, 1.0
         self.jumps: list[float] = []
         self.redundant: bool | None = None
@@ -224,7 +224,7 @@ class MemberContact:
         """
         numbered = [replace(point, number=i) for i, point in enumerate(points)]
         for _ in FIRM if self.scene.rubs and points else (1.0,):
-            set_up = tuple(self.gripping.set_up(source.fields, point) for point in numbered)
+            set_up = self.gripping.set_up(source.fields, numbered)
             found = self._corrected(replace(mesh, points=set_up), source, way, since, drag)
             if found is not None:
                 return found
@@ -262,15 +262,17 @@ class MemberContact:
         # Those that continue are where the points of the state are now.
         now = zip(self.points(source), before.mesh.points, strict=True)
         formers = {(p.pair, tuple(round(x, 9) for x in p.at)): former for p, former in now}
-        for point in target.mesh.points:
-            change = (self._vector(source.fields, point)[:axes] - undeformed_distance(self.scene, point)[:axes]) / unit
+        placed = Placed(self.scene, source.fields, target.mesh.points)
+        begin = undeformed_vectors(self.scene, target.mesh.points)
+        for i, point in enumerate(target.mesh.points):
+            change = (placed.vectors[i] - begin[i])[:axes] / unit
             for k in range(axes):
                 y[numbers[f"{point.between}, {'xyz'[k]}"]] = change[k]
             for side, free in enumerate(point.slides):
                 if free:
                     y[numbers[f"{point.place(side)}, arc length"]] = 0.0
                 else:
-                    self._placed(y, numbers, source.fields, target, point, side)
+                    self._placed(y, numbers, target, point, side, placed.places[i][side])
             former = formers.get((point.pair, tuple(round(x, 9) for x in point.at)))
             if former is not None and not point.new:
                 for one, other in zip(former.rows(axes), point.rows(axes), strict=True):
@@ -281,25 +283,20 @@ class MemberContact:
         return replace(state, y=y, lam=lam)
 
     @staticmethod
-    def _placed(
-        y: Array, numbers: dict[str, int], fields: Fields, target: Model, point: ContactPoint, side: int
-    ) -> None:
-        """Enter how far the end of elements has moved where a point stays, into displacements (n,) by their numbers."""
+    def _placed(y: Array, numbers: dict[str, int], target: Model, point: ContactPoint, side: int, now: Array) -> None:
+        """Enter how far the end of elements has moved where a point stays, which is ``now`` (3,) m, into displacements
+        (n,) by their numbers.
+        """
         member, cut = point.members[side], standing(target.mesh, point, side)
         if cut is None:
             return
         x = target.mesh.cuts[member][[cut]]
         place = place_of_cut(target.mesh, target.segments.ends, member, cut)
-        moved = fields.positions(member, x)[0] - target.scene.center_lines[member].positions(x)[0]
+        moved = now - target.scene.center_lines[member].positions(x)[0]
         for k, axis in enumerate("xyz"[: target.element.axes]):
             number = numbers.get(f"{place}.{axis}")
             if number is not None:
                 y[number] = moved[k] / target.scales.length
-
-    def _vector(self, fields: Fields, one: ContactPoint | Near) -> Array:
-        """The vector (3,) from the second centre line, or the obstacle, to the first, m."""
-        places = [fields.positions(m, np.array([at]))[0] for m, at in zip(one.members, one.at, strict=True)]
-        return np.asarray(places[0] - (places[1] if len(places) == 2 else self.scene.obstacles[one.contact].place))
 
     def resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float = 0.0) -> Solved | None:
         """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found."""
@@ -346,7 +343,7 @@ class MemberContact:
             return (*(self._freed(fields, point) for point in kept), *more), int(wrong.sum()) + len(more)
         kept = self._merged(now, pushes)
         freed = tuple(self._freed(fields, point) for point in kept)
-        moved = any(self.gripping.off_centre(fields, *each) for each in zip(points, now, strict=True))
+        moved = self.gripping.off_centre(fields, points, now)
         return freed, int(moved or freed != tuple(now))
 
     def _wrong(self, found: Solved, now: list[ContactPoint], pushes: Array) -> Array:
@@ -474,7 +471,8 @@ class MemberContact:
             apart = after.positions(member, x) - before.positions(member, x)
             moved = max(moved, float(np.linalg.norm(apart, axis=1).max()))
         found = self.closest.found(before, 2.0 * moved, pairs)
-        return [near for near in found if near.normal @ self._vector(after, near) <= 0.0]
+        vectors = Placed(self.scene, after, found).vectors
+        return [near for near, vector in zip(found, vectors, strict=True) if near.normal @ vector <= 0.0]
 
     def turned(self, before: Fields, after: Fields) -> float:
         """Largest angle between tangents of the same place in two states, rad."""

@@ -31,7 +31,7 @@ Alart and Curnier 1991 (friction as an equation).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, final
 
@@ -46,7 +46,7 @@ from .rings import GuidedTerm, guided
 from .segments import place_of_cut, standing
 from .terms import GROUND, One, Side, Term
 
-__all__ = ["Apart", "Gap", "Meeting", "contact_points_in", "undeformed_distance"]
+__all__ = ["Apart", "Gap", "Meeting", "contact_points_in", "undeformed_vectors"]
 
 
 @final
@@ -231,17 +231,25 @@ NOWHERE = 1e-40
 """Square of a force and a slip that have no direction."""
 
 
-def undeformed_distance(scene: Scene, point: ContactPoint) -> Array:
-    """Vector (3,) from the second undeformed centre line, or the obstacle, to the first where a point begins, m."""
-    lines = [scene.center_lines[member] for member in point.members]
-    places = [line.positions(np.array([at]))[0] for line, at in zip(lines, point.at, strict=True)]
-    return np.asarray(places[0] - (places[1] if len(places) == 2 else scene.obstacles[point.contact].place))
+def undeformed_vectors(scene: Scene, points: Sequence[ContactPoint]) -> list[Array]:
+    """Vectors (3,) from second undeformed centre lines, or obstacles, to the first where points begin, m."""
+    places: dict[tuple[str, float], Array] = {}
+    for member in {member for point in points for member in point.members}:
+        at = sorted({x for point in points for m, x in zip(point.members, point.at, strict=True) if m == member})
+        found = scene.center_lines[member].positions(np.array(at))
+        places |= {(member, x): place for x, place in zip(at, found, strict=True)}
+    vectors = []
+    for point in points:
+        ends = [places[each] for each in zip(point.members, point.at, strict=True)]
+        vectors.append(np.asarray(ends[0] - (ends[1] if len(ends) == 2 else scene.obstacles[point.contact].place)))
+    return vectors
 
 
 def contact_points_in(parts: Parts) -> Iterator[One]:
     """Terms of the points where members touch each other or obstacles."""
     segments, unit, axes, space = parts.segments, parts.scales.length, parts.element.axes, parts.element.space
-    for point in parts.mesh.points:
+    vectors = undeformed_vectors(parts.scene, parts.mesh.points)
+    for point, begin in zip(parts.mesh.points, vectors, strict=True):
         between = segments.place(point.between)
         slides = [segments.place(point.place(i)) if free else GROUND for i, free in enumerate(point.slides)]
         stands = [standing(parts.mesh, point, side) for side in range(len(point.members))]
@@ -256,7 +264,6 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
                 continue
             yield from guided(parts, Meeting, (point.name,) * 2, (member, point.at[side]), slides[side], side == 1)
         gap, ways = _gap(parts.scene, point, space)
-        begin = undeformed_distance(parts.scene, point)
         data = np.append(begin[:axes], point.distance) / unit
         data = np.concatenate([*(way[:axes] for way in ways), data])
         grip = point.grip
