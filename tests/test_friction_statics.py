@@ -171,3 +171,10 @@ def test_wrong_input_is_told_in_one_sentence(more, sentence):
 def test_analyses_that_have_no_order_are_refused():
     with pytest.raises(SceneError, match=r"found friction with analysis\.type = 'path', accepted"):
         cantilever((0, -3), TIP_FLOOR | {"friction": 0.1}, analysis={"type": "path", "range": [0, 1]})
+
+
+@pytest.mark.parametrize("more", [{"friction": 0.1}, {"member_radius": 0.01}])
+def test_node_that_is_moved_into_an_obstacle_is_told(more):
+    moved = {"m": {"node": "A", "displacement": [0, -0.5]}}
+    with pytest.raises(SolveError, match=r"node A is held 0\.(2|21) m inside contacts\.c"):
+        solve(cantilever((0, 0), TIP_FLOOR | more, motions=moved))

@@ -216,8 +216,11 @@ class Closest:
             padded = np.concatenate([[np.inf], gaps, [np.inf]])
             # Of a member that lies along a plane rounding shall not make a minimum of each sample.
             rounding = ALIKE * np.abs(gaps).max()
-            least = (gaps < padded[:-2] - rounding) | (padded[:-2] == np.inf)
-            least &= gaps <= padded[2:] + rounding
+            before, after = padded[:-2], padded[2:]
+            # Of a stretch at one distance both ends.
+            least = ((gaps < before - rounding) & (gaps <= after + rounding)) | (
+                (gaps <= before + rounding) & (gaps < after - rounding)
+            )
             least &= gaps < reach + self.lengths[member] * np.diff(places).max()
             i = np.flatnonzero(least)
             at = self._least(

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from ..contact.contact_balance import refuse_unbalanced
-from ..contact.contact_statics import ContactRun, Pressed
+from ..contact.contact_statics import ContactRun, Pressed, refuse_held_inside
 from ..contact.settling import Held
 from ..errors import LIMITS, SolveError, Status
 from ..solvers.prepared import Prepared
@@ -41,7 +41,7 @@ class ContactSteps:
         SceneError, SolveError
             A held node is inside an obstacle; no equilibrium was found.
         """
-        self.run.refuse_held_inside(pilot, factor)
+        refuse_held_inside(self.scene, pilot, factor)
         return self._answer(pilot, factor)
 
     def _answer(self, pilot: Prepared, factor: float) -> Equilibrium:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.contact_statics import refuse_held_inside
 from ..contact.member_contact import MemberContact
 from ..description.inserting import stops_between
 from ..errors import LIMITS, SolveError, Status
@@ -64,6 +65,7 @@ class MemberContactSteps:
         SceneError, SolveError
             Members penetrate each other in the undeformed scene; no equilibrium was found.
         """
+        refuse_held_inside(self.scene, pilot, factor)
         zero = self.undeformed(pilot)
         if not self.checked:
             self.run.redundant = redundant(pilot.equations, zero.point)

@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 
+from ..contact.contact_statics import refuse_held_inside
 from ..contact.member_contact import MemberContact
 from ..description.inserting import stops_between
 from ..errors import SolveError, Status
@@ -100,6 +101,7 @@ class RoughContactSteps:
             now = self._known(run, run.follow(mesh, lambda t: lambda model: model.loading(0.0, t), now), 0.0, 0.0)
         for factor in self.scene.analysis.steps:
             self.failed = (factor, [])
+            refuse_held_inside(self.scene, prepared, factor)
             told: tuple[str, ...] = (ORDER_MATTERS,)
             for a, b in itertools.pairwise(stops_between(self.scene, last, factor)):
                 mesh = replace(now.model.mesh, points=())
