@@ -202,14 +202,14 @@ class Rough(Term):
         coefficient, firm = ca.vertsplit(data[first : first + 2])
         frame = ca.vertsplit(data[first + 2 :], n)[: n - 1]
         # The nearest force to w that Coulomb's law allows.
-        way, limit = friction - firm * slip, coefficient * ca.fmax(u[1][0], 0.0)
+        slipped = slip + YIELDING * friction
+        way, limit = friction - firm * slipped, coefficient * ca.fmax(u[1][0], 0.0)
         size = ca.sqrt(ca.dot(way, way) + NOWHERE)
         # What is new sticks: how hard it pushes is not known yet.
         held = ca.logic_or(size <= limit, firm <= 0.0)
         missing = []
         for share, along in zip(u[1][1:], frame, strict=True):
-            sticking = -ca.dot(slip, along) - YIELDING * share
-            missing.append(ca.if_else(held, sticking, share - limit * ca.dot(way, along) / size))
+            missing.append(ca.if_else(held, -ca.dot(slipped, along), share - limit * ca.dot(way, along) / size))
         nothing = [ca.SX(0)] * (n - 1)
         pairs = zip(tangents, (1.0, -1.0), strict=False)
         slides = [part for tangent, sign in pairs for part in (sign * ca.dot(friction, tangent), *nothing)]
