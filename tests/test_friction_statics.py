@@ -74,6 +74,33 @@ def test_friction_does_not_depend_on_the_axes():
         assert np.sum(found["force"], axis=0)[2] == pytest.approx(3.0, abs=1e-8)
 
 
+@pytest.mark.parametrize("changed", [0.0, 1e-14, -1e-14])
+@pytest.mark.parametrize("angle", [0.3, 0.31, 0.7])
+def test_bar_on_an_incline_stands_on_its_ends_whatever_rounding_makes_of_it(angle, changed):
+    """In axes that no number of it fits: all along it has no distance from the incline but by rounding."""
+    c, s = np.cos(angle), np.sin(angle)
+
+    def at(x):
+        return [1.37 * c * x + 0.11 * (1.0 + changed), 1.37 * s * x + 0.07]
+
+    scene = Scene.from_dict(
+        {
+            "nodes": {"A": {"position": at(0)}, "B": {"position": at(1)}},
+            "members": {"bar": {"nodes": ["A", "B"], "type": "rigid"}},
+            "loads": {
+                "a": {"type": "force", "node": "A", "value": [0, -1]},
+                "b": {"type": "force", "node": "B", "value": [0, -2]},
+            },
+            "contacts": {"incline": FLOOR | {"point": at(0.3), "normal": [-s, c], "friction": 2.0}},
+            "analysis": {"accuracy": 1e-6},
+        }
+    )
+    step = solve(scene).last
+    assert sorted(point.at for point in step.model.mesh.points) == [(0.0,), (1.0,)]
+    np.testing.assert_allclose(step.contacts["incline"]["force"], [0.0, 3.0, 0.0], atol=1e-8)
+    assert step.contacts["incline"]["sticking"] is True
+
+
 def cantilever(load, contact=None, **more):
     """A cantilever of unit length with a force at its end."""
     table = {

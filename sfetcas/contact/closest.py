@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..description.contacts import contact_radius, pairs_of
 from ..description.obstacles import Obstacle, members_of, takes_part
 from ..description.scene import Scene
@@ -215,7 +216,7 @@ class Closest:
             gaps = self._gaps(fields, pair, places)[0]
             padded = np.concatenate([[np.inf], gaps, [np.inf]])
             # Of a member that lies along a plane rounding shall not make a minimum of each sample.
-            rounding = ALIKE * np.abs(gaps).max()
+            rounding = max(ALIKE * np.abs(gaps).max(), tolerances.DECIMAL * self.scene.size)
             before, after = padded[:-2], padded[2:]
             # Of a stretch at one distance both ends.
             least = ((gaps < before - rounding) & (gaps <= after + rounding)) | (
