@@ -23,6 +23,7 @@ from ..description.scene import Scene
 from ..mathematics.arrays import TINY, Array, Index
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint
+from ..mechanics.segments import standing
 
 __all__ = ["Closest", "Near", "Pair", "PairKey", "answers"]
 
@@ -523,7 +524,7 @@ def answers(fields: Fields) -> dict[str, dict[str, Any]]:
             continue
         entries = [_entry(fields, point) for point in points]
         if not contact.between_members:
-            entries = _stretches(fields, entries)
+            entries = _stretches(fields, points, entries)
         found[name] = entries[0] if len(entries) == 1 else {key: [e[key] for e in entries] for key in entries[0]}
     return found
 
@@ -542,37 +543,27 @@ def _entry(fields: Fields, point: ContactPoint) -> dict[str, Any]:
     return {**entry, "gap": float(gap) - fields.model.scene.contacts[point.contact].member_radius}
 
 
-def _stretches(fields: Fields, entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Entries on an obstacle, those at ends of elements that follow each other as one along a stretch."""
+def _stretches(
+    fields: Fields, points: Sequence[ContactPoint], entries: Sequence[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """Entries of points on an obstacle, those at ends of elements that follow each other as one along a stretch."""
     found: list[dict[str, Any]] = []
     last = None
-    for entry in entries:
-        cuts = fields.model.mesh.cuts[entry["member"]]
-        number = int(np.argmin(np.abs(cuts - entry["at"])))
-        here = (entry["member"], number) if abs(cuts[number] - entry["at"]) < CUT else None
-        if here is not None and last == (entry["member"], number - 1):
+    for point, entry in zip(points, entries, strict=True):
+        cut = standing(fields.model.mesh, point, 0)
+        if cut is not None and last == (entry["member"], cut - 1):
             before = found[-1]
-            begin = np.atleast_1d(before["at"])[0]
+            begin = float(np.atleast_1d(before["at"])[0])
             gap = max(before["gap"], entry["gap"], key=abs)
+            found[-1] = {**before, "force": before["force"] + entry["force"], "at": [begin, entry["at"]], "gap": gap}
             if "friction" in entry:
-                before = before | {
-                    "friction": before["friction"] + entry["friction"],
-                    "sticking": before["sticking"] and entry["sticking"],
-                }
-            found[-1] = {
-                **before,
-                "force": before["force"] + entry["force"],
-                "at": [float(begin), entry["at"]],
-                "gap": gap,
-            }
+                found[-1]["friction"] = before["friction"] + entry["friction"]
+                found[-1]["sticking"] = before["sticking"] and entry["sticking"]
         else:
             found.append(entry)
-        last = here
+        last = None if cut is None else (entry["member"], cut)
     return found
 
 
 NEARBY = 1.0
 """Distance up to which the gap of members that do not touch is told, in sizes of the scene."""
-
-CUT = 1e-12
-"""Fraction of a length within which a place is at an end of elements."""

@@ -22,7 +22,7 @@ from ..solvers.continuation import JUMPED, between, near_factor
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.stability import Stability
 from .settling import Held, Way, placed
-from .touches import COARSE, NOISE, Touched, edge_sides, obstacles_of
+from .touches import COARSE, NOISE, Touched, edge_sides
 from .touching import Toucher
 
 __all__ = ["ContactRun", "Pressed", "refuse_held_inside"]
@@ -253,7 +253,7 @@ class ContactRun:
         SolveError
             There is one; the message names the direction.
         """
-        stops, axes = obstacles_of(pilot.model), pilot.model.element.axes
+        stops, axes = self.scene.obstacles, pilot.model.element.axes
         free = np.array(pilot.diagnosis.drifts).reshape(-1, axes)
         if not len(free) or any(stop.kind != "flat" for stop in stops.values()):
             return

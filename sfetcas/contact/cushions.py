@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..description.obstacles import members_of, obstacle, swept, takes_part
+from ..description.obstacles import members_of, swept, takes_part
 from ..description.scene import Scene
 from ..errors import SolveError
 from ..mathematics.arrays import Array
@@ -99,8 +99,7 @@ class Cushions:
         self, scene: Scene, prepare: Callable[[Mesh], Prepared], sides: Mapping[tuple[str, str], float]
     ) -> None:
         self.scene, self.prepare, self.sides = scene, prepare, sides
-        space = scene.resolved_dimension == "space"
-        self.obstacles = {name: obstacle(contact, space) for name, contact in scene.contacts.items()}
+        self.obstacles = scene.obstacles
         self.left: list[float] = []
         self._parts: tuple[float, ...] = ()
 

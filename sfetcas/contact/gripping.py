@@ -13,6 +13,8 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, unit
+from ..mechanics.balance import three
+from ..mechanics.contact_joints import directions_along
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Grip, Vector
 from .closest import Closest, Near
@@ -106,7 +108,7 @@ class Gripping:
             grip=Grip(
                 coefficient,
                 self.firm or (0.0 if point.new else FIRM[0]),
-                tuple(_told(way) for way in _across(normal, now.tangents[i][0], fields.model.space)),
+                tuple(_told(three(way)) for way in directions_along(normal[: fields.model.element.axes])),
                 _told(apart + touched),
                 tuple(map(_told, before.tangents[i])),
                 tuple(map(_told, now.tangents[i])),
@@ -126,11 +128,9 @@ class Gripping:
 
     def begun(self, point: ContactPoint) -> ContactPoint:
         """A point of a state from which the next step of a way begins."""
-        return (
-            point
-            if point.grip is None
-            else replace(point, grip=replace(point.grip, touched=(0.0, 0.0, 0.0), share=0.0))
-        )
+        if point.grip is None:
+            return point
+        return replace(point, grip=replace(point.grip, touched=(0.0, 0.0, 0.0), share=0.0))
 
     def off_centre(self, fields: Fields, points: Sequence[ContactPoint], now: Sequence[ContactPoint]) -> bool:
         """Whether a point has moved so far that friction has to be set up again where it is."""
@@ -153,18 +153,6 @@ class Gripping:
         if stop is None:
             return unit(placed.vectors[i])
         return np.asarray(stop.normals(placed.places[i][0][None], placed.tangents[i][0][None])[0])
-
-
-def _across(normal: Array, tangent: Array, space: bool) -> list[Array]:
-    """Unit vectors (3,) across a normal: one in the plane, two in space, the first along a tangent if it can be."""
-    first = np.cross([0.0, 0.0, 1.0], normal)
-    if not space:
-        return [first]
-    along = tangent - (tangent @ normal) * normal
-    if np.linalg.norm(along) < 1e-3:
-        along = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    first = unit(along)
-    return [first, np.cross(normal, first)]
 
 
 def _told(vector: Array) -> Vector:

@@ -500,9 +500,11 @@ class MemberContact:
             if crossings:
                 # Members thinner than the step is long touch where they were nearest before.
                 there = self.resolved(mesh, (*points, *map(_begun, crossings)), now.solved, way(part))
+                crossings = [] if there is None else self._crossings(now.solved.fields, there.fields)
             if there is not None and (
-                self.turned(now.solved.fields, there.fields) > self.stride
-                or self.passed(now.solved.fields, there.fields)
+                crossings
+                or self.turned(now.solved.fields, there.fields) > self.stride
+                or self._crossings(there.fields, now.solved.fields)
             ):
                 there = None
             begun = None if there is None else self.gripping.begins(there.model.mesh.points, TOUCHED * self.first)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .. import tolerances
-from ..description.obstacles import members_of, obstacle, takes_part
+from ..description.obstacles import members_of, takes_part
 from ..description.scene import Scene
 from ..errors import SolveError, Status
 from ..mathematics.arrays import TINY, first_of_largest
@@ -16,7 +16,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import Touch
 from ..mechanics.model import Model
 from .settling import ONE_PLACE, Held, Ran, Way, moved
-from .touches import MOST_RISE, NOISE, Gap, Loose, obstacles_of
+from .touches import MOST_RISE, NOISE, Gap, Loose
 
 __all__ = ["Reviser", "Tried"]
 
@@ -143,7 +143,7 @@ class Reviser:
 
     def takes_part(self, contact: str, node: str) -> bool:
         """Whether an obstacle can exert a force on a node: supports and motions leave it free to move."""
-        stop = obstacle(self.scene.contacts[contact], self.scene.resolved_dimension == "space")
+        stop = self.scene.obstacles[contact]
         return takes_part(node, self.scene.nodes[node], self.scene.motions.values(), stop)
 
     def released(self, model: Model, loading: Loading, touches: Touches, way: Way) -> Touches:
@@ -151,7 +151,7 @@ class Reviser:
         if not any(touch.to is not None and {0.0, 1.0} & {*touch.places} for touch in touches):
             return touches
         shift = loading.shift.reshape(-1, model.element.axes) * model.scales.length
-        found, stops = [], obstacles_of(model)
+        found, stops = [], model.scene.obstacles
         for touch in touches:
             for k, x in enumerate(touch.places if touch.to is not None else ()):
                 node = self.scene.members[touch.member].node_at(x)

@@ -17,17 +17,16 @@ from typing import Any
 import numpy as np
 
 from .. import tolerances
-from ..description.obstacles import Obstacle, members_of, nearest, obstacle, obstacles_among, takes_part
+from ..description.obstacles import members_of, nearest, takes_part
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, unit
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Spot, Touch
-from ..mechanics.model import Model
 from ..mechanics.rotations import STIFF, end_joints
 
-__all__ = ["COARSE", "MOST_RISE", "NOISE", "Gap", "Loose", "Opened", "Touched", "answers", "edge_sides", "obstacles_of"]
+__all__ = ["COARSE", "MOST_RISE", "NOISE", "Gap", "Loose", "Opened", "Touched", "answers", "edge_sides"]
 
 COARSE = 1e-6
 """Penetration that is accepted on coarse meshes, on the way to the answer, share of the size of the scene."""
@@ -117,20 +116,13 @@ class Opened:
     couple: float
 
 
-def obstacles_of(model: Model) -> Mapping[str, Obstacle]:
-    """The obstacles of a model's scene by name."""
-    contacts = obstacles_among(model.scene.contacts)
-    return {name: obstacle(contact, model.space) for name, contact in contacts.items()}
-
-
 def edge_sides(scene: Scene) -> dict[tuple[str, str], float]:
     """For each edge and member 1 or -1: sign of (edge x tangent) on the allowed side, in the undeformed scene."""
     found = {}
-    for name, contact in obstacles_among(scene.contacts).items():
-        stop = obstacle(contact, scene.resolved_dimension == "space")
+    for name, stop in scene.obstacles.items():
         if stop.side is None:
             continue
-        for member in members_of(contact, scene.members):
+        for member in members_of(scene.contacts[name], scene.members):
             line, x = scene.center_lines[member], np.linspace(0.0, 1.0, 257)
             near = np.argmin(np.linalg.norm((line.positions(x) - stop.place) @ stop.across, axis=1))
             normal = np.cross(stop.normal, line.tangents(x[near : near + 1])[0])
@@ -160,7 +152,7 @@ class Touched:
 
     def _take(self, fields: Fields, state: State) -> None:
         self.fields, self.model, self._state = fields, fields.model, state
-        self.obstacles = obstacles_of(self.model)
+        self.obstacles = self.model.scene.obstacles
         names = self.model.row_names
         self._row = {name: i for i, name in reversed(list(enumerate(names)))}
 

@@ -6,7 +6,7 @@ space: a member slides over it, and the normal is that of the member).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -26,7 +26,6 @@ __all__ = [
     "members_of",
     "nearest",
     "obstacle",
-    "obstacles_among",
     "rounded",
     "swept",
     "takes_part",
@@ -123,11 +122,6 @@ def members_of(contact: Contact, members: Iterable[str]) -> list[str]:
     if contact.member is not None:
         return [contact.member]
     return list(members) if contact.members == "all" else list(contact.members or ())
-
-
-def obstacles_among(contacts: Mapping[str, Contact]) -> dict[str, Contact]:
-    """Those of the contacts that are with obstacles, not between members."""
-    return {name: contact for name, contact in contacts.items() if not contact.between_members}
 
 
 def takes_part(name: str, node: Node, motions: Iterable[Motion], stop: Obstacle) -> bool:

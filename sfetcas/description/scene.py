@@ -311,13 +311,7 @@ class Scene(Record):
 
         They touch each other, have a radius on obstacles, or laws that touches as conditions of elements do not know.
         """
-        return any(
-            contact.between_members
-            or contact.member_radius > 0.0
-            or (contact.friction > 0.0 and self.analysis.type != "dynamic")
-            or any(_of_points(self, contact, member) for member in members_of(contact, self.members))
-            for contact in self.contacts.values()
-        )
+        return any(_why_points(self, name) for name in self.contacts)
 
     @property
     def rubs(self) -> bool:

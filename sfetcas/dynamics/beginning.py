@@ -55,7 +55,7 @@ def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
     still = {name: history.factor(0.0) for name, history in histories.items()} if scene.tendons else {}
     driven["histories"] = {name: History(t=(0.0, 1.0), value=(factor, factor)) for name, factor in still.items()}
     tables: dict[str, Any] = {**driven, "nodes": nodes, "members": members}
-    if any(contact.friction for contact in scene.contacts.values()):
+    if scene.rubs:
         smooth = {name: contact.model_copy(update={"friction": 0.0}) for name, contact in scene.contacts.items()}
         tables["contacts"] = smooth
     # What acts later only, or is cut, may be all that makes a scene one in space.

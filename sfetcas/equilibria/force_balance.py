@@ -12,7 +12,6 @@ import numpy as np
 
 from .. import tolerances
 from ..contact.contact_balance import SHARE
-from ..description.obstacles import obstacles_among
 from ..description.tendons import Hole, Stretch
 from ..errors import SolveError, Status
 from ..mathematics import quaternion
@@ -34,9 +33,7 @@ def refuse_lost_forces(answer: Equilibrium) -> None:
     if any(spring.type == "translational" and spring.to is None for spring in scene.springs.values()):
         return
     forces = [answer.reaction(name)[0] for name, node in scene.nodes.items() if node.support != "free"]
-    forces += [
-        np.reshape(answer.contacts[name]["force"], (-1, 3)).sum(axis=0) for name in obstacles_among(scene.contacts)
-    ]
+    forces += [np.reshape(answer.contacts[name]["force"], (-1, 3)).sum(axis=0) for name in scene.obstacles]
     forces += [pull for name in scene.tendons for pull in _pulls_of_ground(answer, name)]
     forces.append(answer.fields.total_load)
     missing = np.sum(forces, axis=0)

@@ -28,7 +28,7 @@ from .single import finished, unjudged
 from .solution import Equilibrium, refuse_large
 from .ways import NO_ENERGY, Ways
 
-__all__ = ["MemberContactSteps", "on_way"]
+__all__ = ["MemberContactSteps", "on_way", "undeformed"]
 
 NEAR = 0.5
 """Rotation, rad, from mesh to mesh up to which a state is the same."""
@@ -66,7 +66,7 @@ class MemberContactSteps:
             Members penetrate each other in the undeformed scene; no equilibrium was found.
         """
         refuse_held_inside(self.scene, pilot, factor)
-        zero = self.undeformed(pilot)
+        zero = undeformed(pilot)
         if not self.checked:
             self.run.redundant = redundant(pilot.equations, zero.point)
             self.run.refuse_penetrating(zero.fields)
@@ -79,13 +79,6 @@ class MemberContactSteps:
         found, more = self._reached(pilot, factor, zero)
         self.last = (factor, found)
         return self._refined(found, factor, (*notes, *more))
-
-    @staticmethod
-    def undeformed(pilot: Prepared) -> Solved:
-        """The undeformed scene as a state."""
-        nothing = pilot.model.loading(0.0, 0.0)
-        state = pilot.equations.start(nothing)
-        return Solved(pilot, state, nothing, pilot.equations.at(state, nothing), 0.0)
 
     def _begun(self, pilot: Prepared, factor: float, zero: Solved) -> Solved | None:
         """Where a small share of the loads puts what has no place without loads; None where that is not near."""
@@ -198,6 +191,13 @@ class MemberContactSteps:
             detail = "what touches on a coarse mesh was not found on a finer one"
             raise SolveError(Status.FAILED, detail, found.state)
         return there
+
+
+def undeformed(pilot: Prepared) -> Solved:
+    """The undeformed scene as a state."""
+    nothing = pilot.model.loading(0.0, 0.0)
+    state = pilot.equations.start(nothing)
+    return Solved(pilot, state, nothing, pilot.equations.at(state, nothing), 0.0)
 
 
 def on_way(begin: float, end: float, part: float) -> Callable[[Model], Loading]:

@@ -22,12 +22,11 @@ from ..mechanics.mesh import Mesh
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.redundancy import redundant
 from .force_balance import refuse_lost_forces
-from .member_contact_steps import MemberContactSteps, on_way
+from .member_contact_steps import on_way, undeformed
 from .meshing import Meshing
-from .refinement import MOST_ELEMENTS, Refinement
+from .refinement import MOST_ELEMENTS
 from .single import finished, unjudged
 from .solution import Equilibrium, refuse_large
-from .ways import Ways
 
 __all__ = ["RoughContactSteps"]
 
@@ -46,13 +45,12 @@ class RoughContactSteps:
 
     Parameters
     ----------
-    meshes, ways, refinement
-        Of the scene, see :class:`~sfetcas.equilibria.statics.LoadSteps`.
+    meshes : Meshing
+        Of the scene.
     """
 
-    def __init__(self, meshes: Meshing, ways: Ways, refinement: Refinement) -> None:
-        self.meshes, self.refinement, self.scene = meshes, refinement, meshes.scene
-        self.simple = MemberContactSteps(meshes, ways, refinement)
+    def __init__(self, meshes: Meshing) -> None:
+        self.meshes, self.scene = meshes, meshes.scene
         self.failed: tuple[float, list[Equilibrium]] = (0.0, [])
 
     def answers(self, pilot: Prepared) -> list[Equilibrium]:
@@ -91,7 +89,7 @@ class RoughContactSteps:
         run.stride, run.first = run.stride * 0.5**level, run.first * 0.5**level
         run.rough, run.finer = run.rough * 0.1**level, 0.5**level
         prepared = self.meshes.prepared(mesh)
-        zero = self.simple.undeformed(prepared)
+        zero = undeformed(prepared)
         run.redundant = redundant(prepared.equations, zero.point)
         run.refuse_penetrating(zero.fields)
         now, last = run.lying(zero), 0.0

@@ -134,7 +134,7 @@ class LoadSteps:
         """The load steps where there is friction."""
         from .rough_contact_steps import RoughContactSteps
 
-        sequence = RoughContactSteps(self.meshes, self.ways, self.refinement)
+        sequence = RoughContactSteps(self.meshes)
         try:
             return self._solved(sequence.answers(pilot), begin)
         except SolveError as error:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import tolerances
-from ..description.obstacles import Obstacle, obstacle, rounded, takes_part
+from ..description.obstacles import Obstacle, rounded, takes_part
 from ..description.scene import Scene
 from ..description.structure import SLIDING
 from ..description.supports import turned_about
@@ -239,11 +239,9 @@ class _Toucher:
 
     def all(self) -> Iterator[One]:
         """Every touch of the mesh; what is held or lies there already needs no row."""
-        touched = {touch.contact for touch in self.mesh.touches}
-        obstacles = {name: obstacle(self.scene.contacts[name], self.element.space) for name in touched}
         covered: set[tuple[str, int]] = set()
         for touch in self.mesh.touches:
-            stop = obstacles[touch.contact]
+            stop = self.scene.obstacles[touch.contact]
             if touch.to is None:
                 yield self._on(touch, stop)
                 yield from self._lying(touch, stop, covered) if touch.flat else ()
@@ -285,7 +283,7 @@ class _Toucher:
     def _stopped(self, spot: Spot) -> One:
         """A place that an obstacle stops in a motion."""
         space = self.element.space
-        stop = obstacle(self.scene.contacts[spot.contact], space)
+        stop = self.scene.obstacles[spot.contact]
         start = self.scene.center_lines[spot.member].positions(np.array([spot.at]))[0] - stop.place
         flat = stop.kind == "flat"
         data = self._flat(stop, start, 0.0) if flat else self._round(stop, start, 0.0)
@@ -295,7 +293,7 @@ class _Toucher:
     def _sticking(self, spot: Spot) -> One:
         """A place that an obstacle holds along it: in the undeformed scene, or where a motion says."""
         axes, line, x = self.element.axes, self.scene.center_lines[spot.member], np.array([spot.at])
-        stop = obstacle(self.scene.contacts[spot.contact], self.element.space)
+        stop = self.scene.obstacles[spot.contact]
         normal = stop.normals(line.positions(x), line.tangents(x))[0, :axes]
         data = np.append(directions_along(normal), np.zeros((axes - 1, 1)), axis=1).ravel()
         place = (self.segments.place(spot.place),)
@@ -314,7 +312,7 @@ class _Toucher:
     def _cushioned(self, cushion: Cushion) -> One:
         """A place that is pushed softly; an edge is rounded for that."""
         space, unit = self.element.space, self.scales.length
-        stop = rounded(obstacle(self.scene.contacts[cushion.contact], space), cushion.edge)
+        stop = rounded(self.scene.obstacles[cushion.contact], cushion.edge)
         start = self.scene.center_lines[cushion.member].positions(np.array([cushion.at]))[0] - stop.place
         stiffness = cushion.stiffness * unit / self.scales.force
         data = self._flat(stop, start, 0.0) if stop.kind == "flat" else self._round(stop, start, 0.0)

@@ -144,7 +144,7 @@ class Gap(Term):
 
 @final
 @dataclass(frozen=True)
-class Rough(Term):
+class RoughGap(Term):
     """Contact with friction at a point.
 
     Places: the vector, the forces, the places on the members.  Data: of the gap, the coefficient, how firm it is,
@@ -275,7 +275,7 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
         frame = [np.array(one)[:axes] for one in grip.frame]
         data = np.concatenate([data, [grip.coefficient, grip.firm], *frame, origin, *further])
         places = (between, segments.place(point.pressed), *slides)
-        yield One(Rough(space, gap, len(point.members)), point.name, "", numbers(data), (), places)
+        yield One(RoughGap(space, gap, len(point.members)), point.name, "", numbers(data), (), places)
 
 
 def _gap(scene: Scene, point: ContactPoint, space: bool) -> tuple[Gap, list[Array]]:

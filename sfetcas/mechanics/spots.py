@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from .. import tolerances
-from ..description.obstacles import Obstacle, members_of, obstacle, takes_part
+from ..description.obstacles import Obstacle, members_of, takes_part
 from ..description.scene import Scene
 from ..description.structure import SLIDING
 from ..mathematics.arrays import Array
@@ -29,9 +29,8 @@ __all__ = ["ending_at", "fine_enough", "spots_of"]
 def spots_of(scene: Scene, mesh: Mesh) -> tuple[Spot, ...]:
     """All places of members on a mesh that obstacles may push: each once, whichever members end there."""
     found: dict[tuple[str, str], Spot] = {}
-    space = scene.resolved_dimension == "space"
-    for contact, record in scene.contacts.items():
-        stop = obstacle(record, space)
+    for contact, stop in scene.obstacles.items():
+        record = scene.contacts[contact]
         for member in members_of(record, scene.members):
             for at, place in _places(scene, mesh, member, stop):
                 found.setdefault((contact, place), Spot(contact, member, at, place, rubs=record.friction > 0.0))
@@ -65,12 +64,11 @@ def fine_enough(scene: Scene, mesh: Mesh, accuracy: float, fixed: Collection[str
     if not scene.contacts:
         return mesh
     cuts, reaching = dict(mesh.cuts), carried(scene)
-    space = scene.resolved_dimension == "space"
     for member in mesh.cuts:
         stops = [
-            obstacle(record, space)
-            for record in scene.contacts.values()
-            if member in members_of(record, scene.members) and member not in fixed
+            stop
+            for contact, stop in scene.obstacles.items()
+            if member in members_of(scene.contacts[contact], scene.members) and member not in fixed
         ]
         if not stops:
             continue
