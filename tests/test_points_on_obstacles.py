@@ -67,6 +67,16 @@ def test_cylinder_in_space_is_a_circle_in_the_plane(axis):
     np.testing.assert_allclose(force_of(space), force_of(plane), atol=1e-4)
 
 
+def test_distance_from_a_cylinder_is_that_from_its_axis():
+    """Pushed along the axis too, against contact as conditions of elements on a cylinder that is larger."""
+    section = {"sections": {"s": {"EI2": 2.0, "EI3": 1.0, "GJ": 1.0}}, "dimension": "space"}
+    cylinder = DRUM | {"type": "cylinder", "axis": [0.3, 0, 1]}
+    thin, thick = (solve(cantilever(c, (0, -3, 0.7), **section)).last for c in (cylinder, smaller(cylinder)))
+    assert abs(thin.position("B")[2]) > 0.05
+    np.testing.assert_allclose(thick.position("B"), thin.position("B"), atol=2e-7)
+    np.testing.assert_allclose(force_of(thick), force_of(thin), atol=1e-4)
+
+
 def test_what_stretches_little_touches_a_drum_as_what_does_not():
     stiff = solve(cantilever(DRUM)).last
     stretched = [solve(cantilever(DRUM, section={"EA": size})).last for size in (1e3, 1e4)]
