@@ -48,6 +48,10 @@ def test_block_goes_out_stays_and_comes_back_as_far_as_friction_lets_it():
     assert [floor["friction"][0] for floor in floors] == pytest.approx([-0.6, 0.4, 0.6], abs=1e-7)
     assert [floor["sticking"] for floor in floors] == [False, True, False]
     assert steps[0].certificate.stable == "not defined"
+    # Half of the friction is at either end, where the weights are too: the bar is pulled, and nothing bends it.
+    along = steps[0].along("bar", [0.0, 0.5, 1.0])
+    np.testing.assert_allclose(along["force"], [[1.7, 0.0, 0.0]] * 3, atol=1e-8)
+    np.testing.assert_allclose(along["moment"], 0.0, atol=1e-8)
     assert any("order of the steps" in note for note in steps[0].notes)
 
 

@@ -77,6 +77,17 @@ def test_distance_from_a_cylinder_is_that_from_its_axis():
     np.testing.assert_allclose(force_of(thick), force_of(thin), atol=1e-4)
 
 
+def test_forces_along_a_member_that_touches_with_its_first_end():
+    """The moment at a place is that of the load and the push beyond it."""
+    step = solve(cantilever(smaller(FLOOR), members={"beam": {"nodes": ["B", "A"], "section": "s"}})).last
+    assert step.contacts["c"]["at"] == 0.0
+    along, force = step.along("beam", [0.02, 0.4]), force_of(step)[:2] + np.array([0.0, -3.0])
+    np.testing.assert_allclose(np.abs(along["force"][:, :2]), [np.abs(force)] * 2, atol=1e-6)
+    arms = along["position"] - step.position("B")
+    moments = np.abs(arms[:, 0] * force[1] - arms[:, 1] * force[0])
+    np.testing.assert_allclose(np.abs(along["moment"][:, 2]), moments, atol=1e-6)
+
+
 def test_what_stretches_little_touches_a_drum_as_what_does_not():
     stiff = solve(cantilever(DRUM)).last
     stretched = [solve(cantilever(DRUM, section={"EA": size})).last for size in (1e3, 1e4)]

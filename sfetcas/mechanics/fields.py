@@ -31,7 +31,7 @@ from .magnetism import magnet_terms
 from .memory import dissipated_along
 from .mesh import ContactPoint, Touch
 from .relaxation import carried, relax
-from .segments import pulled_place
+from .segments import pulled_place, standing
 from .singles import fibre_strain
 from .stations import Stations
 from .stretch_laws import strain_by_force
@@ -173,16 +173,20 @@ class Fields:
         return answer
 
     @functools.cached_property
-    def _pushed(self) -> dict[str, list[tuple[float, Array]]]:
-        """Where rings, other members and obstacles push members, fraction of the length and force (3,) N, by member."""
-        found: dict[str, list[tuple[float, Array]]] = {}
+    def _pushed(self) -> dict[str, list[tuple[float, Array | None]]]:
+        """Where rings, other members and obstacles push members, by member: fraction of the length, and within elements
+        the force (3,) N.
+        """
+        found: dict[str, list[tuple[float, Array | None]]] = {}
         for name, ring in self.model.scene.rings.items():
             answer = self.ring(name)
             found.setdefault(ring.member, []).append((answer["at"], answer["force"]))
         for point in self.model.mesh.points:
             answer = self.contact_point(point)
-            for member, at, sign in zip(point.members, answer["at"], (1.0, -1.0), strict=False):
-                found.setdefault(member, []).append((at, sign * answer["force"]))
+            for side, (member, at) in enumerate(zip(point.members, answer["at"], strict=True)):
+                # Where elements end it pushes a place between them: their forces jump there by themselves.
+                force = (1.0 - 2.0 * side) * answer["force"] if standing(self.model.mesh, point, side) is None else None
+                found.setdefault(member, []).append((at, force))
         return found
 
     @functools.cached_property
@@ -469,6 +473,8 @@ class Fields:
         """What pushes a member: its element, counted from 0, fraction of the length, and force (3,), dimensionless."""
         cuts, found = self.model.mesh.cuts[member], list[tuple[int, float, Array]]()
         for at, force in self._pushed.get(member, ()):
+            if force is None:
+                continue
             # At an end of elements it is that before it, as the terms of rings have it.
             element = int(np.clip(np.searchsorted(cuts, at, side="left") - 1, 0, len(cuts) - 2))
             found.append((element, at, force / self.model.scales.force))
