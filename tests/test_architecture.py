@@ -105,6 +105,7 @@ ORDER = [
     "mechanics.tendon_shares",
     "mechanics.tubes",
     "mechanics.rings",
+    "mechanics.contact_lines",
     "mechanics.contact_points",
     "mechanics.tube_fields",
     "mechanics.resistance",

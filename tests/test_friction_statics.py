@@ -209,3 +209,60 @@ def test_node_that_is_moved_into_an_obstacle_is_told(more):
     moved = {"m": {"node": "A", "displacement": [0, -0.5]}}
     with pytest.raises(SolveError, match=r"node A is held 0\.(2|21) m inside contacts\.c"):
         solve(cantilever((0, 0), TIP_FLOOR | more, motions=moved))
+
+
+def rope_on_drum(*, bending=1e-6, stretch=1e3, friction=0.3, accuracy=1e-6):
+    """A thin rope along the upper half of a rough drum of 1 m, held at its left end and pulled down at its right."""
+    return Scene.from_dict(
+        {
+            "sections": {"rope": {"EI3": bending, "EA": stretch}},
+            "nodes": {"held": {"position": [-1, 0], "support": "hinge"}, "pulled": {"position": [1, 0]}},
+            "members": {
+                "rope": {"nodes": ["held", "pulled"], "section": "rope", "shape": {"type": "arc", "angle": -np.pi}}
+            },
+            "loads": {"pull": {"type": "force", "node": "pulled", "value": [0, -1]}},
+            "contacts": {
+                "drum": {"type": "circle", "center": [0, 0], "radius": 1.0, "members": "all", "friction": friction}
+            },
+            "analysis": {"accuracy": accuracy},
+        }
+    )
+
+
+def test_the_tension_of_a_rope_on_a_drum_falls_as_that_of_the_capstan():
+    """At every place, also within elements: exp(mu theta), with the angle where the stretched rope is now."""
+    step = solve(rope_on_drum()).steps[-1]
+    x = np.linspace(0.05, 0.95, 37)
+    along = step.along("rope", x)
+    angle = np.pi - np.arctan2(*along["position"].T[1::-1])
+    tension = np.einsum("ni,in->n", along["force"][:, :2], [np.sin(angle), np.cos(angle)])
+    # What is asked for of the limit without bending.
+    np.testing.assert_allclose(tension, np.exp(-0.3 * (np.pi - angle)), rtol=1e-6)
+    # Nothing bends it there: it has the curvature of the drum, but for what a stretch of a thousandth changes.
+    np.testing.assert_allclose(along["moment"], 0.0, atol=1e-8)
+    drum = step.contacts["drum"]
+    assert not drum["sticking"]
+    # The drum has the reactions of all, and of a pull of one newton what is held is the rest.
+    np.testing.assert_allclose(drum["force"] + step.reaction("held")[0], [0.0, 1.0, 0.0], atol=1e-9)
+
+
+def test_what_lies_on_a_floor_is_pressed_all_along():
+    """A beam lies with its own weight: no force goes through its sections, also between the ends of elements."""
+    scene = Scene.from_dict(
+        {
+            "sections": {"strip": {"EI3": 1.0}},
+            "nodes": {"left": {"position": [0, 0.05]}, "right": {"position": [1, 0.05]}},
+            "members": {"strip": {"nodes": ["left", "right"], "section": "strip"}},
+            "loads": {
+                "weight": {"type": "distributed", "member": "strip", "value": [0, -8]},
+                "pull": {"type": "force", "node": "right", "value": [1, 0]},
+            },
+            "contacts": {"floor": FLOOR | {"friction": 0.5, "member_radius": 0.05}},
+        }
+    )
+    step = solve(scene).steps[-1]
+    along = step.along("strip", np.linspace(0.02, 0.98, 25))
+    # What is rough gives way by a billionth, which bends the strip: pressed at ends of elements it is 0.2 N or more.
+    np.testing.assert_allclose(along["force"][:, 1], 0.0, atol=1e-6)
+    np.testing.assert_allclose(along["moment"], 0.0, atol=1e-6)
+    np.testing.assert_allclose(step.contacts["floor"]["force"], [-1.0, 8.0, 0.0], atol=1e-9)

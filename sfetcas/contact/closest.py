@@ -22,8 +22,8 @@ from ..description.obstacles import Obstacle, members_of, takes_part
 from ..description.scene import Scene
 from ..mathematics.arrays import TINY, Array, Index
 from ..mechanics.fields import Fields
-from ..mechanics.mesh import ContactPoint
-from ..mechanics.segments import standing
+from ..mechanics.mesh import ContactPoint, Mesh
+from ..mechanics.segments import standing, stations_of_line
 
 __all__ = ["Closest", "Near", "Pair", "PairKey", "answers"]
 
@@ -355,6 +355,25 @@ class Closest:
                 continue
             known.append(place)
             yield Near(pair.contact, pair.members, place, normals[i], float(apart[i]) - pair.distance, pair.distance)
+
+    def along(self, fields: Fields, pair: Pair, mesh: Mesh, reach: float) -> list[Near]:
+        """Of the ends of elements of the first member of a pair on some mesh those at which the second one is nearer
+        than ``reach``, m, as of :meth:`beside`; gaps from obstacles are the means of lines.
+        """
+        cuts = mesh.cuts[pair.members[0]]
+        if pair.stop is None:
+            return self.beside(fields, pair, cuts, reach)
+        normals = self._gaps(fields, pair, cuts)[1]
+        points = [ContactPoint(*pair.key, (x,), (False,), pair.distance, line=True) for x in cuts.tolist()]
+        at, share = zip(*(stations_of_line(mesh, point) for point in points), strict=True)
+        starts = np.cumsum([0, *map(len, at[:-1])])
+        # Also at an end that is held, whose element is free to leave.
+        gaps = np.add.reduceat(self._gaps(fields, pair, np.concatenate(at))[0] * np.concatenate(share), starts)
+        return [
+            Near(*pair.key, point.at, normal, gap, pair.distance)
+            for point, normal, gap in zip(points, normals, gaps.tolist(), strict=True)
+            if gap < reach
+        ]
 
     def beside(self, fields: Fields, pair: Pair, stations: Array, reach: float) -> list[Near]:
         """Of places (n,) of the first member of a pair those at which the second one, or the obstacle, is nearer than

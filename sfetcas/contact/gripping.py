@@ -16,7 +16,8 @@ from ..mathematics.arrays import Array, unit
 from ..mechanics.balance import three
 from ..mechanics.contact_joints import directions_along
 from ..mechanics.fields import Fields
-from ..mechanics.mesh import ContactPoint, Grip, Vector
+from ..mechanics.mesh import ContactPoint, Grip, Mesh, Vector
+from ..mechanics.segments import stations_of_line
 from .closest import Closest, Near
 
 __all__ = ["FIRM", "Gripping", "Placed"]
@@ -82,13 +83,14 @@ class Gripping:
         """Take the next of the numbers that Newton's method depends on."""
         self.firm = FIRM[(FIRM.index(self.firm) + 1) % len(FIRM)]
 
-    def set_up(self, fields: Fields, points: Sequence[ContactPoint]) -> tuple[ContactPoint, ...]:
-        """Points with their friction where they are now."""
+    def set_up(self, fields: Fields, mesh: Mesh, points: Sequence[ContactPoint]) -> tuple[ContactPoint, ...]:
+        """Points on a mesh with their friction where they are now."""
         if not self.scene.rubs:
             return tuple(points)
         now = Placed(self.scene, fields, points)
         before = now if self.since is None else Placed(self.scene, self.since, points)
-        return tuple(self._set_up(fields, point, i, now, before) for i, point in enumerate(points))
+        set_up = [self._set_up(fields, point, i, now, before) for i, point in enumerate(points)]
+        return tuple(self._on_line(fields, mesh, point) if point.line else point for point in set_up)
 
     def _set_up(self, fields: Fields, point: ContactPoint, i: int, now: Placed, before: Placed) -> ContactPoint:
         coefficient = self.scene.contacts[point.contact].friction
@@ -117,6 +119,30 @@ class Gripping:
             ),
         )
 
+    def _on_line(self, fields: Fields, mesh: Mesh, point: ContactPoint) -> ContactPoint:
+        """A point on a line with directions at each of its places."""
+        if point.grip is None:
+            return point
+        (member,), (x, share) = point.members, stations_of_line(mesh, point)
+        normals, tangents = self._normals(fields, point, x), fields.tangents(member, x)
+        ways = [unit(tangents - np.einsum("ni,ni->n", tangents, normals)[:, None] * normals)]
+        if fields.model.space:
+            ways.append(np.cross(normals, ways[0]))
+        since = fields if self.since is None else self.since
+        moved = since.positions(member, x) - self.scene.center_lines[member].positions(x) + point.grip.touched
+        means = [float(share @ np.einsum("ni,ni->n", way, moved)) for way in ways]
+        origin = three(np.array([0.0, *means]))
+        frame = tuple(_told(np.eye(3)[i + 1]) for i in range(len(ways)))
+        along = tuple(_told(way) for way in np.stack(ways, axis=1).reshape(-1, 3))
+        grip = replace(point.grip, frame=frame, origin=_told(origin), before=(), now=(), along=along)
+        return replace(point, grip=grip)
+
+    def _normals(self, fields: Fields, point: ContactPoint, x: Array) -> Array:
+        """Unit normals (n, 3) of an obstacle at fractions x (n,) of the length of a member on it."""
+        stop = self.closest.pairs[point.pair].stop
+        assert stop is not None
+        return stop.normals(fields.positions(point.members[0], x), fields.tangents(point.members[0], x))
+
     def begins(self, points: Iterable[ContactPoint], limit: float) -> float | None:
         """Share of a step after which places begin to touch, the first of those that have moved before by more than a
         share of the size of the scene; None where none has.
@@ -137,7 +163,17 @@ class Gripping:
         if not any(point.grip for point in points):
             return False
         placed = Placed(self.scene, fields, now)
-        return any(self._off(i, point, now[i], placed) for i, point in enumerate(points) if point.grip)
+        for i, point in enumerate(points):
+            if point.grip is not None and (
+                self._off_line(fields, point, point.grip) if point.line else self._off(i, point, now[i], placed)
+            ):
+                return True
+        return False
+
+    def _off_line(self, fields: Fields, point: ContactPoint, grip: Grip) -> bool:
+        normals = self._normals(fields, point, stations_of_line(fields.model.mesh, point)[0])
+        ways = np.reshape(grip.along, (len(normals), -1, 3))
+        return bool(np.abs(np.einsum("nki,ni->nk", ways, normals)).max() > CENTRED)
 
     def _off(self, i: int, point: ContactPoint, now: ContactPoint, placed: Placed) -> bool:
         assert point.grip is not None

@@ -26,7 +26,7 @@ from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import ContactPoint, Mesh
 from ..mechanics.model import Model
-from ..mechanics.segments import place_of_cut, standing
+from ..mechanics.segments import cuts_of_point, place_of_cut, standing
 from ..solvers.continuation import JUMPED, near_factor
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
@@ -79,8 +79,10 @@ ROUGH, REFINED = 0.05, 8
 unstable on a coarse mesh may be stable; divisions at one state at most.
 """
 
-HALVED, BESIDE = 3, 2
-"""Times that elements are halved once more, and how many on either side, beside the end of a line."""
+BESIDE, LOCATED = 2, 8.0
+"""Elements on either side of the end of a line that are halved, until what the force there bends in one of them is less
+than so many times the accuracy: an eighth of it is the rotation by a force that is off by half an element.
+"""
 
 NUDGE = 0.02
 """Rotation, rad, by which an unstable state is moved along its unstable mode."""
@@ -190,7 +192,7 @@ class MemberContact:
             if len(along) >= LINE and self._flexible(member):
                 self.lines.add(pair.key)
                 mesh = self._divided(mesh, pair, [near.at[0] for near in along])
-                along = self.closest.beside(fields, pair, mesh.cuts[member], close)
+                along = self.closest.along(fields, pair, mesh, close)
                 found = {key: near for key, near in found.items() if near.pair != pair.key}
             elif self._flexible(member):
                 continue
@@ -198,7 +200,8 @@ class MemberContact:
             found |= {(near.pair, near.at): near for near in along if not known.intersection(self._ends(near))}
         if not found:
             return start
-        points = tuple(replace(_begun(near), number=i) for i, near in enumerate(found.values()))
+        begun = [_begun(near) for near in found.values()]
+        points = tuple(replace(point, number=i, line=self._lies(mesh, point)) for i, point in enumerate(begun))
         prepared = self.prepare(replace(mesh, points=points))
         nothing = prepared.model.loading(0.0, 0.0)
         state = self._carried(start, prepared)
@@ -222,9 +225,9 @@ class MemberContact:
 
         With ``drag`` rotations since another state are resisted, see :class:`~sfetcas.solvers.pseudo_transient.Drag`.
         """
-        numbered = [replace(point, number=i) for i, point in enumerate(points)]
+        numbered = [replace(point, number=i, line=self._lies(mesh, point)) for i, point in enumerate(points)]
         for _ in FIRM if self.scene.rubs and points else (1.0,):
-            set_up = self.gripping.set_up(source.fields, numbered)
+            set_up = self.gripping.set_up(source.fields, mesh, numbered)
             found = self._corrected(replace(mesh, points=set_up), source, way, since, drag)
             if found is not None:
                 return found
@@ -266,13 +269,14 @@ class MemberContact:
         begin = undeformed_vectors(self.scene, target.mesh.points)
         for i, point in enumerate(target.mesh.points):
             change = (placed.vectors[i] - begin[i])[:axes] / unit
-            for k in range(axes):
+            # Means along lines follow in one step of Newton's method.
+            for k in range(axes if not point.line else 0):
                 y[numbers[f"{point.between}, {'xyz'[k]}"]] = change[k]
             for side, free in enumerate(point.slides):
                 if free:
                     y[numbers[f"{point.place(side)}, arc length"]] = 0.0
                 else:
-                    self._placed(y, numbers, target, point, side, placed.places[i][side])
+                    self._placed(y, numbers, target, source.fields, point, side)
             former = formers.get((point.pair, tuple(round(x, 9) for x in point.at)))
             if former is not None and not point.new:
                 for one, other in zip(former.rows(axes), point.rows(axes), strict=True):
@@ -283,20 +287,22 @@ class MemberContact:
         return replace(state, y=y, lam=lam)
 
     @staticmethod
-    def _placed(y: Array, numbers: dict[str, int], target: Model, point: ContactPoint, side: int, now: Array) -> None:
-        """Enter how far the end of elements has moved where a point stays, which is ``now`` (3,) m, into displacements
-        (n,) by their numbers.
+    def _placed(
+        y: Array, numbers: dict[str, int], target: Model, fields: Fields, point: ContactPoint, side: int
+    ) -> None:
+        """Enter how far ends of elements have moved whose places a point needs, into displacements (n,) by their
+        numbers.
         """
-        member, cut = point.members[side], standing(target.mesh, point, side)
-        if cut is None:
-            return
-        x = target.mesh.cuts[member][[cut]]
-        place = place_of_cut(target.mesh, target.segments.ends, member, cut)
-        moved = now - target.scene.center_lines[member].positions(x)[0]
-        for k, axis in enumerate("xyz"[: target.element.axes]):
-            number = numbers.get(f"{place}.{axis}")
-            if number is not None:
-                y[number] = moved[k] / target.scales.length
+        member = point.members[side]
+        cuts = cuts_of_point(target.mesh, point, side)
+        x = target.mesh.cuts[member][cuts]
+        moved = fields.positions(member, x) - target.scene.center_lines[member].positions(x)
+        for cut, change in zip(cuts, moved / target.scales.length, strict=True):
+            place = place_of_cut(target.mesh, target.segments.ends, member, cut)
+            for k, axis in enumerate("xyz"[: target.element.axes]):
+                number = numbers.get(f"{place}.{axis}")
+                if number is not None:
+                    y[number] = change[k]
 
     def resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float = 0.0) -> Solved | None:
         """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found."""
@@ -404,11 +410,18 @@ class MemberContact:
         """Whether a place is one of those along a line: not where the second member ends, which slides on the first."""
         return one.pair in self.lines and _beside_ends(one)
 
+    def _lies(self, mesh: Mesh, one: ContactPoint) -> bool:
+        """Whether a point stands for what presses along a line on an obstacle."""
+        on_line = len(one.members) == 1 and self._of_line(one) and self._flexible(one.members[0])
+        return on_line and standing(mesh, one, 0) is not None
+
     def _deepest(self, fields: Fields, pair: Pair, points: list[ContactPoint]) -> list[Near]:
         """Of ends of elements that penetrate those that do so more than the ones beside them: one by one of a line."""
         cuts = fields.model.mesh.cuts[pair.members[0]]
         known = {p.at[0] for p in points if p.pair == pair.key}
-        near = {one.at[0]: one for one in self.closest.beside(fields, pair, cuts, 0.0) if one.at[0] not in known}
+        near = {
+            one.at[0]: one for one in self.closest.along(fields, pair, fields.model.mesh, 0.0) if one.at[0] not in known
+        }
         gaps = np.array([near[x].gap if x in near else 0.0 for x in cuts.tolist()])
         padded = np.concatenate([[0.0], gaps, [0.0]])
         deep = (gaps <= padded[:-2]) & (gaps <= padded[2:]) & (gaps < -tolerances.DECIMAL * pair.width)
@@ -429,7 +442,7 @@ class MemberContact:
             longest = self._longest(pair, places)
             low, high = min(places) - longest, max(places) + longest
             mesh = self._divided(mesh, pair, places)
-            near = self.closest.beside(found.fields, pair, mesh.cuts[first], 0.1 * pair.width)
+            near = self.closest.along(found.fields, pair, mesh, 0.1 * pair.width)
             inside = [one for one in near if low <= one.at[0] <= high]
             others = tuple(point for point in points if point not in own)
             return mesh, (*others, *map(_begun, inside))
@@ -486,9 +499,9 @@ class MemberContact:
         """Whether a state is unstable, and the scene asks to leave such states."""
         return self.leaves and found.model.minimisable and found.negative > 0
 
-    def follow(self, mesh: Mesh, way: Callable[[float], Way], start: Solved) -> Solved | None:
+    def follow(self, way: Callable[[float], Way], start: Solved) -> Solved | None:
         """The state at the end of a way, ``way(1)``, from its begin; None if it is lost."""
-        self.jumps, falls = [], 0
+        self.jumps, falls, mesh = [], 0, replace(start.model.mesh, points=())
         now, step = _Step(0.0, start), self.first
         while now.part < 1.0:
             self.reached = now
@@ -552,21 +565,28 @@ class MemberContact:
             found = finer
         return found
 
-    def refined(self, found: Solved) -> Mesh:
-        """The mesh of a state with all elements halved, and several times those beside which members cease to touch.
+    def rough_ends(self, found: Solved, accuracy: float) -> dict[str, Array]:
+        """Marks of the elements, by member, in which lines end and where that is therefore not known well enough.
 
-        Where they touch along a line the force by length ends there with a jump or a force at a point.
+        There a force presses at a point, and where in the element is open: what that bends is an error of rotations.
         """
-        model = found.model
-        mesh = replace(model.mesh.refined(None, found.fields.kinks), points=())
-        for (_, (first, *_)), stretches in self._stretches(found).items():
-            for at in (x for stretch in stretches for x in (stretch[0], stretch[-1]) if 0.0 < x < 1.0):
-                for _ in range(HALVED):
-                    marks = {name: np.zeros(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
+        fields, mesh = found.fields, found.model.mesh
+        marks = {name: np.zeros(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
+        pushes = {(p.pair, p.at[0]): fields.contact_point(p)["push"] for p in mesh.points}
+        scales = found.model.scales
+        for key, stretches in self._stretches(found).items():
+            first = key[1][0]
+            lengths = np.diff(mesh.cuts[first]) * self.closest.lengths[first] / scales.length
+            for stretch in stretches:
+                for at, inner in ((stretch[0], stretch[1:2]), (stretch[-1], stretch[-2:-1])):
+                    if not 0.0 < at < 1.0:
+                        continue
+                    force = sum(pushes.get((key, x), 0.0) for x in {at, *inner}) / scales.force
                     cut = mesh.cut_at(first, at)
-                    marks[first][max(cut - BESIDE, 0) : cut + BESIDE] = True
-                    mesh = mesh.refined(marks)
-        return mesh
+                    near = slice(max(cut - BESIDE, 0), cut + BESIDE)
+                    bends = force * lengths[near] ** 2 / fields.stiffness(first, at)
+                    marks[first][near] |= bends > LOCATED * accuracy
+        return marks
 
     def _stretches(self, found: Solved) -> dict[PairKey, list[list[float]]]:
         """Of each line the ends of elements that touch, those together that follow each other: fractions, rising."""
@@ -586,10 +606,9 @@ class MemberContact:
         points = self.points(found)
         for key, stretches in self._stretches(found).items():
             known = {at for stretch in stretches for at in stretch}
-            cuts = mesh.cuts[key[1][0]]
-            between = [x for x in cuts.tolist() if any(s[0] < x < s[-1] for s in stretches) and x not in known]
-            near = self.closest.beside(found.fields, self.closest.pairs[key], np.array(between), np.inf)
-            points = (*points, *map(_begun, near))
+            near = self.closest.along(found.fields, self.closest.pairs[key], mesh, np.inf)
+            inside = [one for one in near if any(s[0] < one.at[0] < s[-1] for s in stretches)]
+            points = (*points, *(_begun(one) for one in inside if one.at[0] not in known))
         return points
 
     @staticmethod

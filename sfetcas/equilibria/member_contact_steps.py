@@ -104,12 +104,11 @@ class MemberContactSteps:
 
     def _reached(self, pilot: Prepared, factor: float, zero: Solved) -> tuple[Solved, tuple[str, ...]]:
         """The state that the loads lead to, from the last factor where that lies on the way, and notes on it."""
-        begin, start, mesh = 0.0, self.run.lying(zero), pilot.model.mesh
+        begin, start = 0.0, self.run.lying(zero)
         if self.last is not None and self.last[0] * (factor - self.last[0]) >= 0.0:
             begin, start = self.last
-            mesh = replace(start.model.mesh, points=())
         elif self.scene.histories:
-            found = self.run.follow(mesh, lambda t: lambda model: model.loading(0.0, t), start)
+            found = self.run.follow(lambda t: lambda model: model.loading(0.0, t), start)
             start = self._known(found)
         elif (pilot.lacks_slack or pilot.diagnosis.mobility) and start is zero:
             bent = self._begun(pilot, factor, zero)
@@ -117,10 +116,10 @@ class MemberContactSteps:
                 begin, start = bent.factor, bent
             elif pilot.diagnosis.mobility:
                 begin = SMALL * factor
-                start = self._known(self.run.relaxed(mesh, zero, lambda model: model.loading(begin)))
+                start = self._known(self.run.relaxed(pilot.model.mesh, zero, lambda model: model.loading(begin)))
         notes: tuple[str, ...] = ()
         for a, b in itertools.pairwise(stops_between(self.scene, begin, factor)):
-            start = self._known(self.run.follow(mesh, partial(on_way, a, b), start))
+            start = self._known(self.run.follow(partial(on_way, a, b), start))
             notes += self.run.notes(a, b)
         return start, notes
 
@@ -144,13 +143,14 @@ class MemberContactSteps:
         smooth, error = np.sqrt(accuracy), np.inf
         for _ in range(LEVELS):
             rough, model = roughness(now.fields) > smooth, now.model
-            marks = {n: rough[model.elements_of(n)] & (n not in self.meshes.fixed) for n in model.members}
+            ends = self.run.rough_ends(now, accuracy)
+            marks = {n: (rough[model.elements_of(n)] | ends[n]) & (n not in self.meshes.fixed) for n in model.members}
             if any(marked.any() for marked in marks.values()):
                 if model.mesh.elements > MOST_ELEMENTS:
                     break
                 now = self._onto(model.mesh.refined(marks, now.fields.kinks), now, factor)
                 continue
-            finer = self._onto(self.run.refined(now), now, factor)
+            finer = self._onto(now.model.mesh.refined(None, now.fields.kinks), now, factor)
             difference, error = self.meshes.judged(unjudged(now), unjudged(finer))
             if self.meshes.prescribed:
                 error += difference

@@ -12,8 +12,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from ..contact.contact_statics import refuse_held_inside
 from ..contact.member_contact import MemberContact
 from ..description.inserting import stops_between
@@ -96,14 +94,13 @@ class RoughContactSteps:
         found, notes = list[Solved](), list[tuple[str, ...]]()
         self.failed = (0.0, [])
         if self.scene.histories:
-            now = self._known(run, run.follow(mesh, lambda t: lambda model: model.loading(0.0, t), now), 0.0, 0.0)
+            now = self._known(run, run.follow(lambda t: lambda model: model.loading(0.0, t), now), 0.0, 0.0)
         for factor in self.scene.analysis.steps:
             self.failed = (factor, [])
             refuse_held_inside(self.scene, prepared, factor)
             told: tuple[str, ...] = (ORDER_MATTERS,)
             for a, b in itertools.pairwise(stops_between(self.scene, last, factor)):
-                mesh = replace(now.model.mesh, points=())
-                now = self._known(run, run.follow(mesh, partial(on_way, a, b), now), a, b)
+                now = self._known(run, run.follow(partial(on_way, a, b), now), a, b)
                 told += run.notes(a, b)
             found.append(now)
             notes.append(told)
@@ -126,7 +123,7 @@ class RoughContactSteps:
         told = [fields.contact_point(point) for point in points if point.grip is not None]
         grips = [point.grip for point in points if point.grip is not None]
         limits = [grip.coefficient * one["push"] for grip, one in zip(grips, told, strict=True)]
-        sizes = [float(np.linalg.norm(one["friction"])) for one in told]
+        sizes = [one["rubs"] for one in told]
         slides = bool(told) and all(size >= NEARLY * limit for size, limit in zip(sizes, limits, strict=True))
         what = "where all that touches is about to slide" if slides else "and no further while members touch"
         detail = f"the loads were followed to the factor {reached:.5g}, {what}"

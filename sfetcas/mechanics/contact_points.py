@@ -10,7 +10,8 @@ says that the force is normal to both members: there the distance is least.  The
 ``t``, not least: of all places it is the worst that must not penetrate.  Sums over elements as of
 :mod:`~sfetcas.mechanics.rings`.
 
-On an obstacle ``d`` begins at its place, a point of a plane, a centre or an axis ``a``, and its gap is
+Along a line on an obstacle ``d`` has means of the gap for its components, see :mod:`~sfetcas.mechanics.contact_lines`.
+Elsewhere on an obstacle ``d`` begins at its place, a point of a plane, a centre or an axis ``a``, and its gap is
 
     n . d - radius_1      or      |d - (a . d) a| - (radius_1 + radius),      inside of it with the opposite sign.
 
@@ -32,7 +33,7 @@ Alart and Curnier 1991 (friction as an equation).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, final
 
 import casadi as ca
@@ -40,6 +41,8 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, numbers
+from .beams import load_size
+from .contact_lines import pressed_along
 from .mesh import ContactPoint
 from .parts import Parts
 from .rings import GuidedTerm, guided
@@ -147,16 +150,16 @@ class Gap(Term):
 class RoughGap(Term):
     """Contact with friction at a point.
 
-    Places: the vector, the forces, the places on the members.  Data: of the gap, the coefficient, how firm it is,
-    directions along, the vector of the last state less that where the search begins, tangents of the members in the
-    last state, and now.
+    Places: the vector, the forces, the places on the members.  Data: of the gap, the coefficient, how firm it is, how
+    much it yields, directions along, the vector of the last state less that where the search begins, tangents of the
+    members in the last state, and now.
 
     Attributes
     ----------
     smooth : Gap
         The gap.
     members : int
-        Two, or one on an obstacle.
+        Two, or one on an obstacle; none where all is measured along directions of its own.
     """
 
     smooth: Gap
@@ -177,11 +180,11 @@ class RoughGap(Term):
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """Its places; no rows."""
-        return 0, 2 + self.members, 0, self.smooth.sizes[3] + 2 + self.axes * (self.axes + 2 * self.members), 0
+        return 0, 2 + self.members, 0, self.smooth.sizes[3] + 3 + self.axes * (self.axes + 2 * self.members), 0
 
     def _parts(self, u: list[Side], data: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, list[ca.SX]]:
         """The gap, its normal, friction (axes,), the slip (axes,), and the tangents of the members."""
-        n, own = self.axes, data[self.smooth.sizes[3] + 2 :]
+        n, own = self.axes, data[self.smooth.sizes[3] + 3 :]
         vectors = ca.vertsplit(own, n)
         frame, origin, tangents = vectors[: n - 1], vectors[n - 1], vectors[n:]
         vector = ca.SX.sym("vector", n)
@@ -199,10 +202,10 @@ class RoughGap(Term):
         """On the vector minus the force of the point; on the forces what they miss; along the members."""
         gap, normal, friction, slip, tangents = self._parts(u, data)
         first, n = self.smooth.sizes[3], self.axes
-        coefficient, firm = ca.vertsplit(data[first : first + 2])
-        frame = ca.vertsplit(data[first + 2 :], n)[: n - 1]
+        coefficient, firm, yields = ca.vertsplit(data[first : first + 3])
+        frame = ca.vertsplit(data[first + 3 :], n)[: n - 1]
         # The nearest force to w that Coulomb's law allows.
-        slipped = slip + YIELDING * friction
+        slipped = slip + yields * friction
         way, limit = friction - firm * slipped, coefficient * ca.fmax(u[1][0], 0.0)
         size = ca.sqrt(ca.dot(way, way) + NOWHERE)
         # What is new sticks: how hard it pushes is not known yet.
@@ -213,7 +216,7 @@ class RoughGap(Term):
         nothing = [ca.SX(0)] * (n - 1)
         pairs = zip(tangents, (1.0, -1.0), strict=False)
         slides = [part for tangent, sign in pairs for part in (sign * ca.dot(friction, tangent), *nothing)]
-        return [*ca.vertsplit(-u[1][0] * normal - friction), -gap - YIELDING * u[1][0], *missing, *slides]
+        return [*ca.vertsplit(-u[1][0] * normal - friction), -gap - yields * u[1][0], *missing, *slides]
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """The force across, friction (3,) on the first member, and how far that has slipped (3,)."""
@@ -222,9 +225,9 @@ class RoughGap(Term):
         return [u[1][0], *ca.vertsplit(friction), *nothing, *ca.vertsplit(slip), *nothing]
 
 
-YIELDING = 1e-9
-"""How far what is rough gives way, dimensionless: what is shared among several places of something rigid,
-or that keeps its length, is shared evenly.
+YIELDING, LEAST_YIELDING = 1e-9, 1e-13
+"""How far what is rough gives way under the loads, dimensionless: what is shared among several places of something
+rigid, or that keeps its length, is shared evenly.  By force it is at least so much that rounding does not decide how.
 """
 
 NOWHERE = 1e-40
@@ -251,6 +254,9 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
     vectors = undeformed_vectors(parts.scene, parts.mesh.points)
     for point, begin in zip(parts.mesh.points, vectors, strict=True):
         between = segments.place(point.between)
+        if point.line:
+            yield from _of_line(parts, point)
+            continue
         slides = [segments.place(point.place(i)) if free else GROUND for i, free in enumerate(point.slides)]
         stands = [standing(parts.mesh, point, side) for side in range(len(point.members))]
         starts = [
@@ -266,16 +272,35 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
         gap, ways = _gap(parts.scene, point, space)
         data = np.append(begin[:axes], point.distance) / unit
         data = np.concatenate([*(way[:axes] for way in ways), data])
-        grip = point.grip
-        if grip is None:
-            yield One(gap, point.name, "", numbers(data), (), (between,), f"{point.name}, gap")
-            continue
-        origin = (np.array(grip.origin) - begin)[:axes] / unit
-        further = [np.array(one)[:axes] for one in (*grip.before, *grip.now)]
-        frame = [np.array(one)[:axes] for one in grip.frame]
-        data = np.concatenate([data, [grip.coefficient, grip.firm], *frame, origin, *further])
-        places = (between, segments.place(point.pressed), *slides)
-        yield One(RoughGap(space, gap, len(point.members)), point.name, "", numbers(data), (), places)
+        yield _held(parts, point, gap, data, begin, slides)
+
+
+def _of_line(parts: Parts, point: ContactPoint) -> Iterator[One]:
+    """Terms of an end of elements on a line: the mean of the gap is a component along a normal."""
+    stop, space = parts.scene.obstacles[point.contact], parts.element.space
+    normal = tuple(stop.normal.tolist()) if stop.kind == "flat" else None
+    gap, ways = _gap(parts.scene, replace(point, normal=normal), space)
+    yield from pressed_along(parts, point, gap, ways, stop.place)
+    axes = parts.element.axes
+    data = np.concatenate([np.eye(axes)[0], np.zeros(axes + 1)])
+    yield _held(parts, point, Gap(space, True), data, np.zeros(3), [])
+
+
+def _held(parts: Parts, point: ContactPoint, gap: Gap, data: Array, begin: Array, slides: list[int]) -> One:
+    """The term that holds the gap; with friction the one that finds the forces."""
+    segments, unit, axes, grip = parts.segments, parts.scales.length, parts.element.axes, point.grip
+    between = segments.place(point.between)
+    if grip is None:
+        return One(gap, point.name, "", numbers(data), (), (between,), f"{point.name}, gap")
+    size = max(load_size(parts.scene, unit) / parts.scales.moment, 1.0)
+    yields = max(YIELDING / size, LEAST_YIELDING)
+    origin = (np.array(grip.origin) - begin)[:axes] / unit
+    further = [np.array(one)[:axes] for one in (*grip.before, *grip.now)]
+    frame = [np.array(one)[:axes] for one in grip.frame]
+    data = np.concatenate([data, [grip.coefficient, grip.firm * size, yields], *frame, origin, *further])
+    places = (between, segments.place(point.pressed), *slides)
+    members = 0 if point.line else len(point.members)
+    return One(RoughGap(parts.element.space, gap, members), point.name, "", numbers(data), (), places)
 
 
 def _gap(scene: Scene, point: ContactPoint, space: bool) -> tuple[Gap, list[Array]]:

@@ -26,12 +26,13 @@ from .balance import three as _three
 from .batches import GroupBatch
 from .equations import Equations, State, gained_tangents, scaled_strains, turned_points, turned_tangents, yielded
 from .laws import curvature_by_moment, form_of
+from .load_terms import pull_within
 from .loading import Loading
 from .magnetism import magnet_terms
 from .memory import dissipated_along
 from .mesh import ContactPoint, Touch
 from .relaxation import carried, relax
-from .segments import pulled_place, standing
+from .segments import beside_line, pulled_place, standing
 from .singles import fibre_strain
 from .stations import Stations
 from .stretch_laws import strain_by_force
@@ -84,7 +85,11 @@ class Fields:
         Of an element along which rings are it is that before the first of them.
         """
         carried = self._equations.segment_pulls(self.state.lam, self._loading)[self.model.segments.owner]
-        return np.asarray(self._loading.pull + (carried + self._strings + self._ringed)[:, None, :])
+        pull = self._loading.pull + (carried + self._strings + self._ringed)[:, None, :]
+        if any(point.line for point in self.model.mesh.points):
+            # Elements on lines begin at places, so that none carries what presses on others.
+            pull = pull + pull_within(self._pressing, self.model.element)
+        return np.asarray(pull)
 
     @functools.cached_property
     def _strings(self) -> Array:
@@ -164,13 +169,47 @@ class Fields:
         found, lines = self.balance.answers("contacts", point.name), self.model.scene.center_lines
         moved = (found["moved on first"], found["moved on second"])
         at = tuple(a + s / lines[m].length for a, s, m in zip(point.at, moved, point.members, strict=False))
-        force = np.array([found[f"force {axis}"] for axis in "xyz"])
+        slip = np.array([found.get(f"slip {axis}", 0.0) for axis in "xyz"])
+        if point.line:
+            shares = self._line_forces(point)
+            force, friction = shares.sum(axis=(0, 1, 2)), shares[1:].sum(axis=(0, 1, 2))
+        else:
+            force = np.array([found[f"force {axis}"] for axis in "xyz"])
+            friction = np.array([found.get(f"friction {axis}", 0.0) for axis in "xyz"])
         answer: dict[str, Any] = {"at": at, "force": force, "push": found["push"]}
         if point.grip is not None:
-            answer |= {key: np.array([found[f"{key} {axis}"] for axis in "xyz"]) for key in ("friction", "slip")}
+            # Along a line the friction that the law is for is that along the directions of each place.
+            size = float(np.linalg.norm([found[f"friction {axis}"] for axis in "xyz"]))
             limit = point.grip.coefficient * found["push"]
-            answer["sticks"] = bool(np.linalg.norm(answer["friction"]) < limit * (1.0 - SLIDES))
+            answer |= {"friction": friction, "slip": slip, "rubs": size, "sticks": size < limit * (1.0 - SLIDES)}
         return answer
+
+    def _line_forces(self, point: ContactPoint) -> Array:
+        """Push, and friction where there is any, (1 or 2, elements, points, 3) N of an end of elements on a line at the
+        points of the elements beside it.
+        """
+        found = self.balance.answers("contacts", point.name)
+        kinds = ("push", "friction") if point.grip is not None else ("push",)
+        sides = ["before" if ends else "beyond" for _, ends, _ in beside_line(self.model.mesh, point)]
+        points = range(len(self.model.element.points))
+        shares = [found[f"{a} {b} at {k} {c}"] for a in kinds for c in sides for k in points for b in "xyz"]
+        return np.reshape(shares, (len(kinds), len(sides), len(points), 3))
+
+    @functools.cached_property
+    def _spread(self) -> Array:
+        """Forces along the elements, at their points (elements, points, axes): loads, and what presses along lines."""
+        lines = [point for point in self.model.mesh.points if point.line]
+        return self._loading.spread + self._pressing if lines else self._loading.spread
+
+    @functools.cached_property
+    def _pressing(self) -> Array:
+        """What presses along lines, at the points of elements, (elements, points, axes)."""
+        found, model = np.zeros_like(self._loading.spread), self.model
+        for point in (point for point in model.mesh.points if point.line):
+            beside = [element for element, *_ in beside_line(model.mesh, point)]
+            forces = self._line_forces(point).sum(axis=0)[..., : model.element.axes] / model.scales.force
+            found[model.beams.first[point.members[0]] + np.array(beside)] += forces
+        return found
 
     @functools.cached_property
     def _pushed(self) -> dict[str, list[tuple[float, Array | None]]]:
@@ -450,7 +489,7 @@ class Fields:
         model = self.model
         part = model.elements_of(member)
         at, pull = self._stations(member, x), self._pull[part]
-        e, spread = at.elements, self._loading.spread[part]
+        e, spread = at.elements, self._spread[part]
         position, moments = self.positions(member, x), self._element_moments(member)
         force = _three(np.einsum("nk,nka->na", at.spread, spread[e]) - pull[e, 0])
         # m' = -r' x n; the pull at the points is minus the force there.
@@ -949,7 +988,7 @@ class Fields:
     def _start_forces(self, part: slice) -> Array:
         """Internal force at the start of each of consecutive elements, (elements, axes)."""
         element = self.model.element
-        spread = self._loading.spread[part]
+        spread = self._spread[part]
         # The pull at the first point is minus the force there; the spread load is distributed as in its adjoint.
         beyond = np.einsum("j,eja->ea", element.to_points[:, 0], spread) / element.weights[0]
         return -self._pull[part][:, 0] - beyond + spread.sum(axis=1)

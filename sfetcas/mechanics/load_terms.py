@@ -44,6 +44,7 @@ __all__ = [
     "inner_cut",
     "loads_in",
     "present",
+    "pull_within",
     "spread_of",
 ]
 
@@ -353,7 +354,7 @@ def carried(forces: Array, segments: Segments, element: Element) -> tuple[Array,
     gradient.
     """
     on_element = forces.sum(axis=1)
-    pull = -np.einsum("jk,eja->eka", element.to_points, forces) / element.weights[:, None]
+    pull = pull_within(forces, element)
     alone, starts = segments.single
     on_places = scattered(len(segments.places), starts, on_element[alone])
     for part in segments.longer:
@@ -364,6 +365,11 @@ def carried(forces: Array, segments: Segments, element: Element) -> tuple[Array,
         pull[here] -= (beyond - on_element[here])[:, None, :]
         on_places[segments.place(part.start)] += beyond[0]
     return pull, on_places
+
+
+def pull_within(forces: Array, element: Element) -> Array:
+    """Pull (elements, points, axes) within each element by the forces along it alone, as of :func:`carried`."""
+    return np.asarray(-np.einsum("jk,eja->eka", element.to_points, forces) / element.weights[:, None])
 
 
 # -- what they are at a state -----------------------------------------------------------------------

@@ -16,6 +16,7 @@ from ..description.sections import breaks as kinks
 from ..description.showing import first_lines, shown
 from ..description.tendons import kinks_along
 from ..description.tubes import tube_breaks
+from ..mathematics import interpolation
 from ..mathematics.arrays import Array, first_of_largest
 from .carried import carried, magnetic, natural_turning
 
@@ -100,6 +101,9 @@ class Grip:
         How far the places had moved along each other since the last state when they began to touch, m.
     share : float
         Of the step from the last state, after which they began to touch.
+    along : tuple of vectors
+        On a line directions across the normal at each point of the elements beside it, those of a point together;
+        ``frame`` and ``origin`` are then components of the means, see :mod:`~sfetcas.mechanics.contact_lines`.
     """
 
     coefficient: float
@@ -110,6 +114,7 @@ class Grip:
     now: tuple[Vector, ...]
     touched: Vector = (0.0, 0.0, 0.0)
     share: float = 0.0
+    along: tuple[Vector, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -139,6 +144,9 @@ class ContactPoint:
         Whether it is not yet known how hard it pushes: where it is is no unknown, and the normal is a given one.
     grip : Grip, optional
         Friction, where there is any.
+    line : bool
+        Whether it is the end of elements along which a member lies on an obstacle, and stands for what presses there,
+        see :mod:`~sfetcas.mechanics.contact_lines`.
     """
 
     contact: str
@@ -150,6 +158,7 @@ class ContactPoint:
     normal: Vector | None = None
     new: bool = False
     grip: Grip | None = None
+    line: bool = False
 
     @property
     def name(self) -> str:
@@ -166,9 +175,16 @@ class ContactPoint:
         return f"place of {self.name} on its {('first', 'second')[side]} member"
 
     def rows(self, axes: int) -> list[str]:
-        """Names of its rows in the plane (two axes) or in space: of the vector between centre lines, and the gap."""
-        gap = [] if self.grip else [f"{self.name}, gap"]
-        return [*(f"{self.name}, {axis + 1} of {axes}" for axis in range(axes)), *gap]
+        """Names of its rows in the plane (two axes) or in space: of the vector between centre lines, and the gap.
+
+        On a line these are means instead of the vector: of the gap alone without friction.
+        """
+        gap, count = [] if self.grip else [f"{self.name}, gap"], self.components(axes)
+        return [*([f"{self.name}, {i + 1} of {count}" for i in range(count)] if count > 1 else [self.name]), *gap]
+
+    def components(self, axes: int) -> int:
+        """Number of components of the vector between centre lines, or of the means along a line."""
+        return 1 if self.line and self.grip is None else axes
 
     @property
     def pressed(self) -> str:
@@ -316,6 +332,11 @@ class Mesh:
     def elements(self) -> int:
         """Number of elements of all members."""
         return sum(len(cuts) - 1 for cuts in self.cuts.values())
+
+    @property
+    def rule(self) -> tuple[Array, Array]:
+        """Places in [0, 1] and weights, sum 1, of the points (p + 1,) at which elements are integrated."""
+        return (interpolation.gauss if self.gauss else interpolation.lobatto)(self.order + 1)
 
     def refined(
         self, marked: Mapping[str, Array] | None = None, kinks: Mapping[str, Sequence[float]] | None = None

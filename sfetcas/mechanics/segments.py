@@ -17,7 +17,6 @@ from ..description.obstacles import members_of
 from ..description.scene import Scene
 from ..description.structure import SLIDING
 from ..description.tendons import Hole, Piece
-from ..mathematics import interpolation
 from ..mathematics.arrays import Array, Index
 from .mesh import ContactPoint, Mesh
 from .rotations import end_joints
@@ -28,8 +27,10 @@ __all__ = [
     "Segment",
     "Segments",
     "angle_of",
+    "beside_line",
     "cushioned",
     "cut_members",
+    "cuts_of_point",
     "elongation_of",
     "place_of_cut",
     "place_of_ring",
@@ -37,7 +38,9 @@ __all__ = [
     "pulled_place",
     "spanned",
     "standing",
+    "stations_of_line",
     "tensions_of",
+    "weights_towards",
 ]
 
 MOST_COUPLED = 20
@@ -151,6 +154,46 @@ def standing(mesh: Mesh, point: ContactPoint, side: int) -> int | None:
     at, cuts = point.at[side], mesh.cuts[point.members[side]]
     near = int(np.argmin(np.abs(cuts - at)))
     return near if not point.slides[side] and abs(cuts[near] - at) < SAME_CUT else None
+
+
+def beside_line(mesh: Mesh, point: ContactPoint) -> list[tuple[int, bool, float]]:
+    """Of a point on a line the elements beside it: number along the member, whether they end there, and their share."""
+    cut, cuts = standing(mesh, point, 0), mesh.cuts[point.members[0]]
+    assert cut is not None
+    elements = [i for i in (cut - 1, cut) if 0 <= i < len(cuts) - 1]
+    lengths = np.diff(cuts)[elements]
+    return [(i, i < cut, share) for i, share in zip(elements, (lengths / lengths.sum()).tolist(), strict=True)]
+
+
+def stations_of_line(mesh: Mesh, point: ContactPoint) -> tuple[Array, Array]:
+    """Of a point on a line the places (n,) at which the elements beside it are integrated, fractions of the length of
+    the member, and their weights (n,) in its means, sum 1.
+    """
+    cuts, (points, weights) = mesh.cuts[point.members[0]], mesh.rule
+    at, share = list[Array](), list[Array]()
+    for i, ends, part in beside_line(mesh, point):
+        at.append(cuts[i] + points * (cuts[i + 1] - cuts[i]))
+        share.append(part * weights_towards(points if ends else 1.0 - points, weights))
+    return np.concatenate(at), np.concatenate(share)
+
+
+def weights_towards(points: Array, weights: Array) -> Array:
+    """Weights of the points of an element in the mean that is taken with what rises evenly from its start to its end.
+
+    Parameters
+    ----------
+    points, weights : ndarray (points,)
+        Places in [0, 1] from the end at which it is zero, and the weights of integrals, sum 1.
+    """
+    return np.asarray(2.0 * weights * points)
+
+
+def cuts_of_point(mesh: Mesh, point: ContactPoint, side: int) -> list[int]:
+    """The ends of elements of a member whose places a point of contact needs; none where it is within an element."""
+    if point.line:
+        return [element for element, *_ in beside_line(mesh, point)]
+    cut = standing(mesh, point, side)
+    return [] if cut is None else [cut]
 
 
 SAME_CUT = 1e-13
@@ -322,8 +365,8 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
         retained |= {ends[name, i] for i, cut in enumerate((0, last)) if cut in touched}
         every = name in stopped or (mesh.places and member.type == "flexible")
         inner = range(1, last) if every else _retained_cuts(scene, mesh, name)
-        points = [(standing(mesh, p, i), m) for p in mesh.points for i, m in enumerate(p.members)]
-        pointed = {cut for cut, m in points if m == name and cut is not None}
+        points = [(p, i) for p in mesh.points for i, m in enumerate(p.members) if m == name]
+        pointed = {cut for p, i in points for cut in cuts_of_point(mesh, p, i)}
         stops = [0, *sorted({*inner, *touched, *pointed} - {0, last}), last]
         here = ends[name, 0]
         for a, b in zip(stops, stops[1:], strict=False):
@@ -345,7 +388,8 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     retained |= {ends[ring.member, 0] for ring in scene.rings.values()}
     for point in mesh.points:
         for side, touching in enumerate(point.members):
-            retained.add(place_of_cut(mesh, ends, touching, standing(mesh, point, side) or 0))
+            for cut in cuts_of_point(mesh, point, side) or [0]:
+                retained.add(place_of_cut(mesh, ends, touching, cut))
     retained |= set(_sprung(scene, mesh)) | {load.node for load in scene.loads.values() if load.follows and load.node}
     sizes = [part.elements.stop - part.elements.start for part in parts]
     owner = np.repeat(np.arange(len(parts)), sizes)
@@ -356,7 +400,8 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     axes = "xyz" if scene.resolved_dimension == "space" else "xy"
     for point in mesh.points:
         strained |= {point.place(side): {0: "arc length"} for side, free in enumerate(point.slides) if free}
-        strained[point.between] = dict(enumerate(axes))
+        names = ("across", "along", "along too") if point.line else axes
+        strained[point.between] = dict(enumerate(names[: point.components(len(axes))]))
         if point.grip is not None:
             strained[point.pressed] = dict(enumerate(("across", "along", "along too")[: len(axes)]))
     return Segments(
@@ -396,7 +441,7 @@ def _strained(scene: Scene, mesh: Mesh, first: int, elements: int) -> tuple[Inde
     if not scene.stretches:
         return np.zeros((elements, 0), np.intp), strained
     strains, begin = np.full((elements, mesh.order + 1), -1), 0
-    points = _points(mesh)
+    points = mesh.rule[0]
     for name in mesh.cuts:
         cuts, member = mesh.cuts[name], scene.members[name]
         if member.stretches(scene.sections):
@@ -407,10 +452,6 @@ def _strained(scene: Scene, mesh: Mesh, first: int, elements: int) -> tuple[Inde
                     strained[f"strain of {name}, element {e + 1}, at {point:.6g} of it"] = components
         begin += len(cuts) - 1
     return strains, strained
-
-
-def _points(mesh: Mesh) -> Array:
-    return (interpolation.gauss if mesh.gauss else interpolation.lobatto)(mesh.order + 1)[0]
 
 
 def _yielding(scene: Scene, name: str) -> dict[int, str]:
@@ -438,7 +479,7 @@ def _relaxing(scene: Scene, mesh: Mesh, first: int, elements: int, strained: dic
         for kind, (what, components) in enumerate(kinds):
             for i in range(len(branches[name])):
                 for e in range(len(cuts) - 1):
-                    for k, point in enumerate(_points(mesh)):
+                    for k, point in enumerate(mesh.rule[0]):
                         found[kind, i, begin + e, k] = first + len(strained)
                         place = f"relaxed {what} {i + 1} of {name}, element {e + 1}, at {point:.6g} of it"
                         strained[place] = components
