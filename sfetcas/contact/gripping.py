@@ -16,7 +16,7 @@ from ..mathematics.arrays import Array, unit
 from ..mechanics.balance import three
 from ..mechanics.contact_joints import directions_along
 from ..mechanics.fields import Fields
-from ..mechanics.mesh import ContactPoint, Grip, Mesh, Vector
+from ..mechanics.mesh import YIELDING, ContactPoint, Grip, Mesh, Vector
 from ..mechanics.segments import stations_of_line
 from .closest import Closest, Near
 
@@ -30,6 +30,11 @@ what that leaves out is of second order.
 FIRM = (1e4, 1.0, 1e6, 0.0)
 """Numbers ``c`` of :mod:`~sfetcas.mechanics.contact_points`, dimensionless, that are tried one after the other; with
 the last what is new sticks, all else has the first.
+"""
+
+SOFT, STRONG = 1e-2, 16.0
+"""How far what is rough gives way at first, dimensionless, and by how much friction is larger, where none of these
+numbers leads to a state.
 """
 
 
@@ -70,18 +75,30 @@ class Gripping:
     closest : Closest
     since : Fields or None
         The last state of the way; None where there is none, so that nothing has slipped.
-    firm : float
+    firm, yields : float
         As of :class:`~sfetcas.mechanics.mesh.Grip`.
+    strength : float
+        Coefficients of friction over those of the scene.
     """
 
     scene: Scene
     closest: Closest
     since: Fields | None = None
     firm: float = FIRM[0]
+    yields: float = YIELDING
+    strength: float = 1.0
 
     def change(self) -> None:
         """Take the next of the numbers that Newton's method depends on."""
         self.firm = FIRM[(FIRM.index(self.firm) + 1) % len(FIRM)]
+
+    def soften(self, part: float) -> None:
+        """Let what is rough give way: at 0 by much, and it sticks; friction then falls to that of the scene, and from
+        the middle on what sticks gets firm, which it is at 1.
+        """
+        limits, firms = min(1.0, 2.0 * part), max(0.0, 2.0 * part - 1.0)
+        self.firm = FIRM[-1] if part <= 0.0 else FIRM[1] if part < 1.0 else FIRM[0]
+        self.yields, self.strength = SOFT * (YIELDING / SOFT) ** firms, STRONG ** (1.0 - limits)
 
     def set_up(self, fields: Fields, mesh: Mesh, points: Sequence[ContactPoint]) -> tuple[ContactPoint, ...]:
         """Points on a mesh with their friction where they are now."""
@@ -108,7 +125,7 @@ class Gripping:
         return replace(
             point,
             grip=Grip(
-                coefficient,
+                coefficient * self.strength,
                 self.firm or (0.0 if point.new else FIRM[0]),
                 tuple(_told(three(way)) for way in directions_along(normal[: fields.model.element.axes])),
                 _told(apart + touched),
@@ -116,6 +133,7 @@ class Gripping:
                 tuple(map(_told, now.tangents[i])),
                 _told(touched),
                 share,
+                yields=self.yields,
             ),
         )
 

@@ -47,6 +47,9 @@ LINE, SHORT, ROUND = 3, 4.0, 0.2
 angle of something round along which a part is at most, rad.
 """
 
+SOFTENED, LEAST_SOFTENED = 0.125, 1e-3
+"""First and least step of the way on which what is rough ceases to give way, parts of it."""
+
 TURN, ITERATIONS = 0.6, 30
 """Largest rotation of a node in a step of Newton's method but the first, rad, and steps at most."""
 
@@ -193,7 +196,10 @@ class MemberContact:
                 self.lines.add(pair.key)
                 mesh = self._divided(mesh, pair, [near.at[0] for near in along])
                 along = self.closest.along(fields, pair, mesh, close)
+                # The line has what it ends at, not the member beside it.
                 found = {key: near for key, near in found.items() if near.pair != pair.key}
+                ends = {end for near in along for end in self._ends(near)}
+                found = {key: near for key, near in found.items() if not ends.intersection(self._ends(near))}
             elif self._flexible(member):
                 continue
             known = {end for near in found.values() for end in self._ends(near)}
@@ -207,7 +213,7 @@ class MemberContact:
         state = self._carried(start, prepared)
         return Solved(prepared, state, nothing, prepared.equations.at(state, nothing), 0.0)
 
-    def _ends(self, near: Near) -> list[tuple[str, str]]:
+    def _ends(self, near: Near | ContactPoint) -> list[tuple[str, str]]:
         """The contact and the node, where a member touches an obstacle at its end."""
         member, at = near.members[0], near.at[0]
         return [(near.contact, self.scene.members[member].nodes[int(at)])] if at in (0.0, 1.0) else []
@@ -232,7 +238,25 @@ class MemberContact:
             if found is not None:
                 return found
             self.gripping.change()
-        return None
+        return self._softly(mesh, numbered, source, way, since, drag) if self.scene.rubs and points else None
+
+    def _softly(
+        self, mesh: Mesh, points: list[ContactPoint], source: Solved, way: Way, since: Solved | None, drag: float
+    ) -> Solved | None:
+        """As :meth:`solved`, from what is rough but gives way."""
+        now, part, step = source, -1.0, 1.0
+        while part < 1.0 and step > LEAST_SOFTENED:
+            after = min(1.0, part + step)
+            self.gripping.soften(after)
+            known = [replace(point, new=after <= 0.0) for point in points]
+            set_up = self.gripping.set_up(now.fields, mesh, known)
+            found = self._corrected(replace(mesh, points=set_up), now, way, since, drag)
+            if found is None:
+                step *= 0.5 if part >= 0.0 else 0.0
+            else:
+                now, part, step = found, after, SOFTENED if part < 0.0 else 1.5 * step
+        self.gripping.soften(1.0)
+        return now if part == 1.0 else None
 
     def _corrected(self, mesh: Mesh, source: Solved, way: Way, since: Solved | None, drag: float) -> Solved | None:
         """The equilibrium on a mesh with its points, as of :meth:`solved`."""
@@ -358,7 +382,9 @@ class MemberContact:
         rounding = LASTING * np.abs(pushes).max(initial=0.0)
         # Along a line what does not push is left; what slides there may have to stay until it is known.
         wrong = lost | (pushes < -rounding - 1e-12 * found.model.scales.force)
-        return wrong | np.array([self._of_line(point) for point in now], dtype=bool) & (pushes < rounding)
+        wrong |= np.array([self._of_line(point) for point in now], dtype=bool) & (pushes < rounding)
+        # What is new sticks, and may pull only because it does.
+        return wrong & np.array([not (point.new and point.grip) for point in found.model.mesh.points], dtype=bool)
 
     def _lost(self, fields: Fields, point: ContactPoint) -> bool:
         """Whether a point is where members are not nearest: where it does not push, nothing else keeps it there."""
@@ -400,8 +426,9 @@ class MemberContact:
         found: list[Near] = []
         for key in self.lines:
             found += self._deepest(fields, self.closest.pairs[key], points)
+        ends = {end for point in points if point.line for end in self._ends(point)}
         for one in self.closest.found(fields, 0.0):
-            deep = one.gap < -self.tolerance and not self._of_line(one)
+            deep = one.gap < -self.tolerance and not self._of_line(one) and not ends.intersection(self._ends(one))
             if deep and not any(self._same(one, point) for point in points if not self._of_line(point)):
                 found.append(one)
         return tuple(_begun(one) for one in sorted(found, key=lambda one: one.gap))

@@ -225,10 +225,8 @@ class RoughGap(Term):
         return [u[1][0], *ca.vertsplit(friction), *nothing, *ca.vertsplit(slip), *nothing]
 
 
-YIELDING, LEAST_YIELDING = 1e-9, 1e-13
-"""How far what is rough gives way under the loads, dimensionless: what is shared among several places of something
-rigid, or that keeps its length, is shared evenly.  By force it is at least so much that rounding does not decide how.
-"""
+LEAST_YIELDING = 1e-13
+"""How far what is rough gives way over the force, dimensionless, at least: rounding then does not decide how."""
 
 NOWHERE = 1e-40
 """Square of a force and a slip that have no direction."""
@@ -293,7 +291,7 @@ def _held(parts: Parts, point: ContactPoint, gap: Gap, data: Array, begin: Array
     if grip is None:
         return One(gap, point.name, "", numbers(data), (), (between,), f"{point.name}, gap")
     size = max(load_size(parts.scene, unit) / parts.scales.moment, 1.0)
-    yields = max(YIELDING / size, LEAST_YIELDING)
+    yields = max(grip.yields / size, LEAST_YIELDING)
     origin = (np.array(grip.origin) - begin)[:axes] / unit
     further = [np.array(one)[:axes] for one in (*grip.before, *grip.now)]
     frame = [np.array(one)[:axes] for one in grip.frame]

@@ -21,6 +21,7 @@ from ..mathematics.arrays import Array, first_of_largest
 from .carried import carried, magnetic, natural_turning
 
 __all__ = [
+    "YIELDING",
     "ContactPoint",
     "Cushion",
     "Grip",
@@ -80,6 +81,12 @@ class Touch:
 Vector = tuple[float, float, float]
 
 
+YIELDING = 1e-9
+"""How far what is rough gives way under the loads, dimensionless: what is shared among several places of something
+rigid, or that keeps its length, is shared evenly.
+"""
+
+
 @dataclass(frozen=True)
 class Grip:
     """Friction at a point of contact since the last state of a way.
@@ -90,6 +97,8 @@ class Grip:
         Coulomb's.
     firm : float
         Force over slip, dimensionless, of :mod:`~sfetcas.mechanics.contact_points`; zero where it sticks anyhow.
+    yields : float
+        How far what sticks gives way under the loads, dimensionless.
     frame : tuple of vectors
         Directions across the normal, one in the plane and two in space.
     origin : vector
@@ -115,6 +124,7 @@ class Grip:
     touched: Vector = (0.0, 0.0, 0.0)
     share: float = 0.0
     along: tuple[Vector, ...] = ()
+    yields: float = YIELDING
 
 
 @dataclass(frozen=True)
