@@ -266,3 +266,35 @@ def test_what_lies_on_a_floor_is_pressed_all_along():
     np.testing.assert_allclose(along["force"][:, 1], 0.0, atol=1e-6)
     np.testing.assert_allclose(along["moment"], 0.0, atol=1e-6)
     np.testing.assert_allclose(step.contacts["floor"]["force"], [-1.0, 8.0, 0.0], atol=1e-9)
+
+
+def test_a_heavy_rope_over_a_rough_drum_stays_though_one_end_is_longer():
+    """0.15 m hang on one side and 0.2 m on the other; what friction holds at most is 0.485 m (closed form)."""
+    radius, short, long = 0.051, 0.15, 0.2
+    weight = {"type": "distributed", "value": [0, -1], "history": "weight"}
+    scene = Scene.from_dict(
+        {
+            "sections": {"rope": {"EI3": 1e-5, "EA": 1e2}},
+            "nodes": {
+                "left": {"position": [-radius, -short]},
+                "on": {"position": [-radius, 0]},
+                "off": {"position": [radius, 0]},
+                "right": {"position": [radius, -long]},
+            },
+            "members": {
+                "short": {"nodes": ["left", "on"], "section": "rope"},
+                "drum": {"nodes": ["on", "off"], "section": "rope", "shape": {"type": "arc", "angle": -np.pi}},
+                "long": {"nodes": ["off", "right"], "section": "rope"},
+            },
+            "loads": {name: weight | {"member": name} for name in ("short", "drum", "long")},
+            "histories": {"weight": {"t": [0], "value": [1]}},
+            "contacts": {
+                "drum": {"type": "circle", "center": [0, 0], "radius": radius, "friction": 0.3, "members": "all"}
+            },
+            "analysis": {"accuracy": 1e-2, "steps": [0.0]},
+        }
+    )
+    drum = solve(scene).steps[-1].contacts["drum"]
+    assert drum["member"] == "drum"
+    # All of the weight, to rounding of what is in balance.
+    np.testing.assert_allclose(drum["force"], [0.0, short + np.pi * radius + long, 0.0], atol=1e-9)

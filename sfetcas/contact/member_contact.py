@@ -50,6 +50,9 @@ angle of something round along which a part is at most, rad.
 SOFTENED, LEAST_SOFTENED = 0.125, 1e-3
 """First and least step of the way on which what is rough ceases to give way, parts of it."""
 
+SLIPPED = 1e-6
+"""Share of the limit of friction from which on a place slides on, and by which length, dimensionless."""
+
 TURN, ITERATIONS = 0.6, 30
 """Largest rotation of a node in a step of Newton's method but the first, rad, and steps at most."""
 
@@ -293,9 +296,12 @@ class MemberContact:
         begin = undeformed_vectors(self.scene, target.mesh.points)
         for i, point in enumerate(target.mesh.points):
             change = (placed.vectors[i] - begin[i])[:axes] / unit
-            # Means along lines follow in one step of Newton's method.
-            for k in range(axes if not point.line else 0):
-                y[numbers[f"{point.between}, {'xyz'[k]}"]] = change[k]
+            if point.line:
+                # Nothing has slipped yet.
+                change = np.array(point.grip.origin)[:axes] / unit if point.grip else np.zeros(1)
+            names = ("across", "along", "along too") if point.line else "xyz"
+            for k, moved in enumerate(change.tolist()):
+                y[numbers[f"{point.between}, {names[k]}"]] = moved
             for side, free in enumerate(point.slides):
                 if free:
                     y[numbers[f"{point.place(side)}, arc length"]] = 0.0
@@ -306,8 +312,14 @@ class MemberContact:
                 for one, other in zip(former.rows(axes), point.rows(axes), strict=True):
                     lam[rows[other]] = source.state.lam[known[one]]
                 if point.grip is not None and former.grip is not None:
-                    for share in ("across", "along", "along too")[:axes]:
-                        y[numbers[f"{point.pressed}, {share}"]] = source.state.y[had[f"{former.pressed}, {share}"]]
+                    shares = ("across", "along", "along too")[:axes]
+                    force = source.state.y[[had[f"{former.pressed}, {share}"] for share in shares]]
+                    y[[numbers[f"{point.pressed}, {share}"] for share in shares]] = force
+                    rubs = float(np.linalg.norm(force[1:]))
+                    if point.line and rubs >= (1.0 - SLIPPED) * point.grip.coefficient * force[0] > 0.0:
+                        # What has slid slides on.
+                        along = [numbers[f"{point.between}, {share}"] for share in shares[1:]]
+                        y[along] -= SLIPPED * force[1:] / rubs
         return replace(state, y=y, lam=lam)
 
     @staticmethod
