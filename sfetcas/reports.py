@@ -302,19 +302,20 @@ def _report_contact(name: str, entry: dict[str, Any], size: float) -> None:
         print(f"  contact {name}: nothing touches it" + ("" if entry["gap"] is None else f", gap {entry['gap']:.9g} m"))
         return
     several = isinstance(entry["member"], list)
-    told = {key: values if several else [values] for key, values in entry.items()}
-    if "other" in told:
-        for member, at, other, there, force in zip(
-            *(told[k] for k in ("member", "at", "other", "other_at", "force")), strict=True
-        ):
-            print(f"  contact {name}: {member} at {at:.9g} and {other} at {there:.9g}, force {_vector(force, size)} N")
-        return
-    for member, at, force in zip(*(told[k] for k in ("member", "at", "force")), strict=True):
-        lies = isinstance(at, list)
-        where = (
-            f"lies on it from {at[0]:.9g} to {at[1]:.9g}, force over this" if lies else f"touches it at {at:.9g}, force"
-        )
-        print(f"  contact {name}: {member} {where} {_vector(force, size)} N")
+    keys = list(entry)
+    for values in zip(*(entry.values() if several else ([value] for value in entry.values())), strict=True):
+        told = dict(zip(keys, values, strict=True))
+        at, force = told["at"], f"force {_vector(told['force'], size)} N"
+        if "other" in told:
+            where = f"at {at:.9g} and {told['other']} at {told['other_at']:.9g}, {force}"
+        elif isinstance(at, list):
+            where = f"lies on it from {at[0]:.9g} to {at[1]:.9g}, {force.replace('force', 'force over this')}"
+        else:
+            where = f"touches it at {at:.9g}, {force}"
+        if "friction" in told:
+            kind = "sticks" if told["sticking"] else "slides"
+            where += f", of it friction {_vector(told['friction'], size)} N: it {kind}"
+        print(f"  contact {name}: {told['member']} {where}")
 
 
 def _effort(value: Any, size: float) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from sfetcas import Scene, SceneError, SolveError, solve
+from sfetcas import Scene, SceneError, SolveError, cli, dump, solve
 
 FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}
 TIP_FLOOR = {"type": "plane", "point": [0, -0.3], "normal": [0, 1], "members": "all"}
@@ -53,6 +53,17 @@ def test_block_goes_out_stays_and_comes_back_as_far_as_friction_lets_it():
     np.testing.assert_allclose(along["force"], [[1.7, 0.0, 0.0]] * 3, atol=1e-8)
     np.testing.assert_allclose(along["moment"], 0.0, atol=1e-8)
     assert any("order of the steps" in note for note in steps[0].notes)
+
+
+def test_the_report_tells_friction_and_whether_it_holds(tmp_path, capsys):
+    """A block that slides, then sticks."""
+    dump(block(0.3, 2.0, steps=(1.0, 0.5)), tmp_path / "scene.json")
+    assert cli.main(["run", str(tmp_path / "scene.json")]) == 0
+    said = [line for line in capsys.readouterr().out.splitlines() if "contact floor" in line]
+    assert [line.rpartition("of it ")[2] for line in said] == [
+        "friction (-0.6, 0, 0) N: it slides",
+        "friction (0.4, 0, 0) N: it sticks",
+    ]
 
 
 def test_how_far_a_force_can_go_before_what_it_pulls_slips_is_told():
