@@ -206,6 +206,15 @@ class Closest:
         ends = self._gaps(fields, pair, np.array([0.0, 1.0]))[0].tolist()
         return min([*ends, *(one.gap for one in self.found(fields, np.inf, [pair]))])
 
+    def smallest_between(self, fields: Fields, contact: str) -> float | None:
+        """Smallest distance of the surfaces of members in a contact between them, m; None where it is large."""
+        pairs, reach = [pair for pair in self._between if pair.contact == contact], self.largest
+        while reach < 2.0 * NEARBY * self.scene.size:
+            if gaps := [near.gap for near in self.found(fields, min(reach, NEARBY * self.scene.size), pairs)]:
+                return min(gaps)
+            reach *= 2.0
+        return None
+
     # -- obstacles --------------------------------------------------------------------------------
 
     def _beside_obstacles(self, fields: Fields, x: dict[str, Array], reach: float, pairs: Sequence[Pair]) -> list[Near]:

@@ -78,7 +78,9 @@ def check_contact(
     """
     for name, contact in contacts.items():
         where = "contacts", name
-        if obstacle(contact, space).kind == "sharp":
+        if contact.between_members:
+            _check_between(analysis, name, contact)
+        elif obstacle(contact, space).kind == "sharp":
             message = f"found a {contact.type} that members slide over, accepted in a motion: a plane, circle, cylinder"
             raise SceneError(f"{message} or sphere", (*where, "type"))
         if analysis.integrator in ("idas", "conserving"):
@@ -89,6 +91,16 @@ def check_contact(
             if members[member].type == "flexible" and section is not None and not section.mass(HEAVY).all():
                 message = f"found the member {member!r}, whose section is without mass, so that it would have to jump"
                 raise SceneError(f"{message}, accepted: a small rhoA", where)
+
+
+def _check_between(analysis: Analysis, name: str, contact: Contact) -> None:
+    """Refuse contact between members that motions do not know."""
+    if contact.friction > 0.0:
+        message = "found between members in a motion, accepted: with analysis.type = 'static', or 0"
+        raise SceneError(message, ("contacts", name, "friction"))
+    if analysis.initial == "equilibrium":
+        message = "found 'equilibrium' with contact between members, accepted: a motion that begins undeformed"
+        raise SceneError(message, ("analysis", "initial"))
 
 
 def check_unilateral(analysis: Analysis, springs: Mapping[str, Spring], tendons: Mapping[str, Tendon]) -> None:

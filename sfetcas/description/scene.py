@@ -1035,7 +1035,7 @@ def _check_points(scene: Scene) -> None:
 def _why_points(scene: Scene, name: str) -> str:
     """What of a contact makes it an unknown where members touch; nothing where it does not."""
     contact = scene.contacts[name]
-    if contact.between_members:
+    if contact.between_members and scene.analysis.type != "dynamic":
         return "contact between members"
     if contact.member_radius > 0.0:
         return "a radius of members on an obstacle"
