@@ -126,6 +126,9 @@ class Events:
         self._of_obstacles = np.array([part.spot is not None for part in parts], bool)
         between = [part.spot.distance / unit if isinstance(part.spot, Approach) else np.inf for part in parts]
         self._late = np.minimum(late, INSIDE * np.array(between))
+        # Hops that were no further than is accepted, one after the other, of each row beside members that may touch.
+        self._rocks, self._small = bool(np.isfinite(between).any()), np.zeros(len(parts), int)
+        self._accepted = np.where(self._of_obstacles, late, 0.0)
         self.rows, self.signs = self.system.unilateral.rows, self.system.unilateral.signs
         self._impacts, self.found = Impacts(self.system), list[Event]()
         # When it happened last, and how often at the same time before.
@@ -440,7 +443,11 @@ class Events:
         speeds = collision.speeds(before, closes)
         ebbed = closes.copy() if self._again > HOPS else self._ebbing(memory.t, speeds)
         # What has hopped no further than is accepted does not rebound once more.
-        quiet = self._of_obstacles & (speeds > 0.0) & (speeds * (memory.t - self._hit) < self._late)
+        hop = speeds * (memory.t - self._hit)
+        quiet = self._of_obstacles & (speeds > 0.0) & (hop < self._late)
+        if self._rocks:
+            self._small = np.where(speeds > 0.0, np.where(hop < self._accepted, self._small + 1, 0), self._small)
+            ebbed = ebbed | (closes & (self._small > CALM))
         self._hit = np.where(speeds > 0.0, memory.t, self._hit)
         velocity, impulses, touching, lost = collision.solved(before | ebbed, closes & ~ebbed, quiet)
         opened = self._opened(memory.q, memory.y, memory.t, memory)
@@ -635,6 +642,9 @@ SOON = 1e-3 * 0.25 ** np.arange(4)
 
 HOPS = 2
 """Events one after the other at the same time, after which rows that close stay closed."""
+
+CALM = 3
+"""Hops no further than is accepted, after which what rocks to and fro on other members and obstacles is at rest."""
 
 CREEPING = 1e-3
 """Share of what is accepted by which a member may go further inside an obstacle from one event to the next."""

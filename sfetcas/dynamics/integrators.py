@@ -169,6 +169,8 @@ class Stages(Integrator):
                     self.proceed(taken.after.t)
                 first = None if first is None else max(LONGER * taken.h, LONGER * SHORTEST)
             memory = None if near is None else near.over
+            if memory is not None and course.end - memory.t <= tolerances.DECIMAL * course.end:
+                memory = None
         yield from self.rest()
 
     def _steps(
