@@ -177,6 +177,9 @@ class Closest:
     def samples(self, fields: Fields, member: str) -> Array:
         """Fractions (n,) of the length of a member between which it is nearly straight."""
         cuts = fields.model.mesh.cuts[member]
+        if self.scene.members[member].type == "rigid" and self.scene.center_lines[member].turning == 0.0:
+            # What is straight, and stays so, needs no short pieces; between shorter ones fewer may be near.
+            return np.linspace(0.0, 1.0, PIECES + 1)
         each = np.diff(cuts) * self.lengths[member] / (SLENDER * self.least[member])
         most = max(PIECES, MOST_PIECES // (len(cuts) - 1))
         counts = np.clip(np.ceil(each), PIECES, most).astype(int)

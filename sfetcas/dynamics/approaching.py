@@ -174,18 +174,20 @@ class Approaching:
             (taken,) = self._events.advanced(taken, left)
         passed = self._events.within(taken)
         steps, after = ([taken], taken.after) if passed is None else (passed.steps, passed.after)
-        if (passed is None and left is not None) or flagged or self._is_stale(after):
+        if (passed is None and left is not None) or self._is_stale(after, flagged):
             self.over = after
             return Passed(steps, after, over=True)
         return passed
 
-    def _is_stale(self, memory: Memory) -> bool:
-        """Whether members are near to each other without a row, in a state far from that of the last search."""
+    def _is_stale(self, memory: Memory, flagged: bool) -> bool:
+        """Whether other rows are needed in a state that is far from that of the last search, or where it is ``flagged``
+        that one no longer holds.
+        """
         moved = np.linalg.norm(self._relative(memory.position) - self._there, axis=1).max(initial=0.0)
-        if moved * self._mover.model.scales.length < 0.125 * self._reach:
+        if moved * self._mover.model.scales.length < 0.125 * self._reach and not flagged:
             return False
-        known = {near.key for near in self.system.model.mesh.approaches}
-        return any(key not in known for key in self._searched(memory))
+        known, found = {near.key for near in self.system.model.mesh.approaches}, self._searched(memory).keys()
+        return found != known if flagged else not found <= known
 
     def _left(self, taken: Taken) -> tuple[float | None, bool]:
         """Share of a step after which the first place of a row that acts leaves its element, None where none does; and

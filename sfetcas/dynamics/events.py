@@ -511,6 +511,10 @@ class Events:
             collision = self._impacts.at(memory)
         # Where it did not hold at this time in a longer step, a shorter one is asked.
         h = max(self._length(h) * SHORTER**self._again, SHORTEST / SHORTER)
+        if self._rocks and memory.rubs is None:
+            # Of many choices the one for accelerations is right, or nearly so.
+            idle = self._soon(replace(memory, acting=np.zeros(len(acting))), h)
+            acting = self._impacts.at(memory).pressing(touching, 2.0 * idle.opened / h**2)
         best, least = acting, len(acting) + 1
         while h > SHORTEST:
             tried: set[bytes] = set()
