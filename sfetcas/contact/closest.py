@@ -465,6 +465,12 @@ class Closest:
         curvature[0, 1] = curvature[1, 0] = (-both - along[0] * along[1]) / apart
         return along, curvature, apart, n
 
+    def half_square(self, fields: Fields, members: tuple[str, str], at: tuple[float, float]) -> tuple[Array, Array]:
+        """Slope (2,), m, and curvature (2, 2) of half the square of the distance of two members by both arc lengths."""
+        pair = Pair("", members, 0.0, 0.0)
+        slope, curvature, _ = self._half_square(fields, pair, np.array(at)[:, None])
+        return slope[:, 0], curvature[:, :, 0]
+
     def _half_square(self, fields: Fields, pair: Pair, at: Array) -> tuple[Array, Array, Array]:
         """Slope (2, n), m, and curvature (2, 2, n) of half the square of the distance, and the distance (n,), m.
 

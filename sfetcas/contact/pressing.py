@@ -16,7 +16,7 @@ __all__ = ["pressed"]
 
 
 def pressed(fields: Fields, contacts: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """For each of the contacts between members what :func:`~sfetcas.contact.closest.answers` gives, without friction."""
+    """For each contact between members what :func:`~sfetcas.contact.closest.answers` gives, without friction."""
     model, found = fields.model, dict[str, dict[str, Any]]()
     entries = sorted(_entries(fields), key=lambda entry: (entry[0], entry[1]["member"], entry[1]["at"]))
     closest = Closest(model.scene)

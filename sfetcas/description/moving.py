@@ -79,7 +79,7 @@ def check_contact(
     for name, contact in contacts.items():
         where = "contacts", name
         if contact.between_members:
-            _check_between(analysis, name, contact)
+            _check_between(analysis, name, contacts)
         elif obstacle(contact, space).kind == "sharp":
             message = f"found a {contact.type} that members slide over, accepted in a motion: a plane, circle, cylinder"
             raise SceneError(f"{message} or sphere", (*where, "type"))
@@ -93,11 +93,16 @@ def check_contact(
                 raise SceneError(f"{message}, accepted: a small rhoA", where)
 
 
-def _check_between(analysis: Analysis, name: str, contact: Contact) -> None:
-    """Refuse contact between members that motions do not know."""
-    if contact.friction > 0.0:
-        message = "found between members in a motion, accepted: with analysis.type = 'static', or 0"
-        raise SceneError(message, ("contacts", name, "friction"))
+def _check_between(analysis: Analysis, name: str, contacts: Mapping[str, Contact]) -> None:
+    """Refuse contact between members with what motions do not know beside it."""
+    for other, contact in contacts.items():
+        if contact.friction > 0.0:
+            what = "between members" if contact.between_members else "beside contact between members"
+            message = f"found {what} in a motion, accepted: with analysis.type = 'static', or 0"
+            raise SceneError(message, ("contacts", other, "friction"))
+    if analysis.integrator == "generalised-alpha":
+        found = "found with the integrator 'generalised-alpha', which does not follow where members touch each other"
+        raise SceneError(f"{found}, accepted: radau-3, radau-2", ("contacts", name))
     if analysis.initial == "equilibrium":
         message = "found 'equilibrium' with contact between members, accepted: a motion that begins undeformed"
         raise SceneError(message, ("analysis", "initial"))

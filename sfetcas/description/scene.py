@@ -1064,6 +1064,9 @@ def _check_between_members(scene: Scene, name: str) -> None:
         if contact_radius(contact, record, scene.sections) is None:
             message = f"found the member {member!r}, whose section has no radius, accepted: the key 'radius'"
             raise SceneError(f"{message}, or a section with shape = 'circle' or 'tube' of one radius", where)
+        if scene.analysis.type == "dynamic" and record.type == "rigid" and scene.center_lines[member].turning:
+            message = f"found the curved rigid member {member!r} in a motion, accepted: straight or flexible ones"
+            raise SceneError(message, where)
         if record.off_line(scene.sections):
             message = f"found the member {member!r}, whose section has {record.off_line(scene.sections)}"
             raise SceneError(f"{message}, accepted: members without touch each other", where)

@@ -1,12 +1,13 @@
 """Members that come near to each other in a motion: which rows there are, followed from one set of them to the next.
 
 A system has a row for each two places that are nearest to each other and nearer than a reach.  Within that system
-impacts, contact and release are those of all unilateral constraints, see :mod:`~sfetcas.dynamics.events`.  The system is
-made anew with other rows, and the motion goes on in it from the same state, where
+impacts, contact and release are those of all unilateral constraints, see :mod:`~sfetcas.dynamics.events`.  The system
+is made anew with other rows, and the motion goes on in it from the same state, where
 
-- a search finds members near to each other without a row; no member moves by more than a quarter of the reach from one
-  search to the next, so that what has no row yet is never touched;
-- a place goes from one element to another, or to the end of its member, or leaves this end: that is located in the step.
+- a search finds members near to each other without a row; no member moves by more than a quarter of the reach from
+  one search to the next, so that what has no row yet is never touched;
+- a place goes from one element to another, or to the end of its member, or leaves this end: that is located in the
+  step.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..contact.closest import Closest, Near, Pair
-from ..errors import SolveError, Status
+from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.clearances import PARALLEL, Rows
 from ..mechanics.equations import State
@@ -77,8 +78,8 @@ class Approaching:
 
     # -- rows -----------------------------------------------------------------------------------------
 
-    def renewed(self, memory: Memory, refused: bool = True) -> Memory:
-        """The state in the system with the rows of what is near in it; those act that acted between the same members."""
+    def renewed(self, memory: Memory) -> Memory:
+        """The state in the system with the rows of what is near; those act that acted between the same members."""
         before, acted = self.system, {}
         for part, acts, held in zip(before.unilateral.parts, memory.acting, memory.held, strict=True):
             if isinstance(part.spot, Approach) and acts:
@@ -96,7 +97,7 @@ class Approaching:
         for i, part in enumerate(rows.parts[kept:], kept):
             assert isinstance(part.spot, Approach)
             close = opened[i] <= CLOSE
-            if close and (not acted or (part.spot.contact, frozenset(part.spot.members)) in acted):
+            if close and (memory.t == 0.0 or (part.spot.contact, frozenset(part.spot.members)) in acted):
                 acting[i], holding[i] = 1.0, -rows.signs[i] * opened[i]
         return replace(memory, lam=lam, acting=acting, held=holding, last=None, unilateral=rows)
 
@@ -114,39 +115,47 @@ class Approaching:
         return found
 
     def _ends(self, fields: Fields, pair: Pair) -> Iterator[Near]:
-        """Ends of either member that are near to the other one, unless something between is nearer."""
+        """Ends of either member that are near to the other one."""
         a, b = pair.members
+        for s, t in ((0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)) if a != b else ():
+            between = fields.positions(a, np.array([s]))[0] - fields.positions(b, np.array([t]))[0]
+            apart = float(np.linalg.norm(between))
+            joined = self._scene.members[a].nodes[int(s)] == self._scene.members[b].nodes[int(t)]
+            if apart < pair.distance + self._reach and not joined:
+                yield Near(pair.contact, pair.members, (s, t), between / apart, apart - pair.distance, pair.distance)
         for members in ((a, b), (b, a)) if a != b else ((a, b),):
             yield from self.closest.beside(fields, replace(pair, members=members), np.array([0.0, 1.0]), self._reach)
 
     def _approach(self, fields: Fields, near: Near) -> Approach | None:
-        """The row of a minimum; None where it is that of another one."""
-        order = slice(None, None, -1) if near.at[1] in (0.0, 1.0) and near.at[0] not in (0.0, 1.0) else slice(None)
-        members, at = near.members[order], near.at[order]
-        held = tuple(x in (0.0, 1.0) for x in at)
-        pair = replace(self.closest.pairs[near.pair if near.pair in self.closest.pairs else (near.contact, near.members[::-1])], members=members)
-        slope, curvature, _ = self.closest._half_square(fields, pair, np.array(at)[:, None])
-        s, h = slope[:, 0], curvature[:, :, 0]
+        """The row of a place where members are near; None where something beside it is nearer, or all is as near."""
+        # What is held comes first.
+        i, k = sorted((0, 1), key=lambda side: near.at[side] not in (0.0, 1.0))
+        members, at = (near.members[i], near.members[k]), (near.at[i], near.at[k])
+        held = at[0] in (0.0, 1.0), at[1] in (0.0, 1.0)
+        slope, h = self.closest.half_square(fields, members, at)
         crossing = np.linalg.det(h) > PARALLEL * h[0, 0] * h[1, 1]
         if not any(held) and not crossing:
             return None
         if any(held) and crossing:
-            free = np.array(at) - np.linalg.solve(h, s) / [self.closest.lengths[m] for m in members]
-            if all(EDGE < x < 1.0 - EDGE for x, h in zip(free, held, strict=True) if h):
+            free = np.array(at) - np.linalg.solve(h, slope) / [self.closest.lengths[m] for m in members]
+            if all(EDGE < x < 1.0 - EDGE for x, one in zip(free, held, strict=True) if one):
                 return None
         elements = []
         for member, x in zip(members, at, strict=True):
             cuts = fields.model.mesh.cuts[member]
             inside = int(np.clip(np.searchsorted(cuts, x, side="right") - 1, 0, len(cuts) - 2))
             elements.append(0 if self._scene.members[member].type == "rigid" else inside)
-        return Approach(near.contact, members, (elements[0], elements[1]), at, (held[0], held[1]), near.distance)
+        return Approach(near.contact, members, (elements[0], elements[1]), at, held, near.distance)
 
     def _refuse_deep(self, near: Near, memory: Memory) -> None:
-        if near.gap < -DEEP * near.distance:
-            a, b = near.members
-            seconds = memory.t * self._mover.time
-            detail = f"at {seconds:.9g} s members {a!r} and {b!r} penetrate by {-near.gap:.3g} m"
-            raise SolveError(Status.STOPPED, f"{detail}, accepted: {DEEP * near.distance:.3g} m", memory)
+        """Refuse members that penetrate each other at the begin, or later where something has gone wrong."""
+        if near.gap >= -DEEP * near.distance:
+            return
+        (a, b), (s, t), seconds = near.members, near.at, memory.t * self._mover.time
+        detail = f"members {a!r} and {b!r} penetrate by {-near.gap:.3g} m at {s:.4g} and {t:.4g} of their lengths"
+        if memory.t == 0.0:
+            raise SceneError(f"{detail} at t = 0, accepted: members that do not", ("contacts", near.contact))
+        raise SolveError(Status.STOPPED, f"at {seconds:.9g} s {detail}", memory)
 
     def _fields(self, memory: Memory) -> Fields:
         """The centre lines at a state."""
@@ -198,7 +207,8 @@ class Approaching:
             return None, False
         assert self._events is not None
         acts = [
-            part.spot.key for part, one in zip(self.system.unilateral.parts, taken.begin.acting, strict=True)
+            part.spot.key
+            for part, one in zip(self.system.unilateral.parts, taken.begin.acting, strict=True)
             if one and isinstance(part.spot, Approach)
         ]
         own = np.array([near.key in acts for rows in self._rows for near in rows.approaches])

@@ -462,11 +462,22 @@ class Events:
         hardest = int(np.argmax(impulses))
         for i in np.flatnonzero((acting != before) | (impulses > 0.0)).tolist():
             own = lost if i == hardest else 0.0
-            self.found.append(Event(memory.t, self.system.unilateral.parts[i], bool(acting[i]), float(impulses[i]), own))
+            self.found.append(
+                Event(memory.t, self.system.unilateral.parts[i], bool(acting[i]), float(impulses[i]), own)
+            )
         if rubs is not None and memory.rubs is not None:
             changed = (rubs.sticks != memory.rubs.sticks) & acting[self._rough]
             for k in np.flatnonzero(changed).tolist():
-                self.found.append(Event(memory.t, self.system.unilateral.parts[self._rough[k]], bool(rubs.sticks[k]), 0.0, 0.0, sticks=True))
+                self.found.append(
+                    Event(
+                        memory.t,
+                        self.system.unilateral.parts[self._rough[k]],
+                        bool(rubs.sticks[k]),
+                        0.0,
+                        0.0,
+                        sticks=True,
+                    )
+                )
         return there
 
     def _resting(self, memory: Memory, touching: Array, slips: Array | None) -> tuple[Memory, Array]:
@@ -687,8 +698,8 @@ ROUNDING = 1e-12
 """Of openings, unit of length or rad."""
 
 INSIDE = 1e-6
-"""Share of the distance of touching centre lines by which members may be inside each other where events follow each other
-quickly.
+"""Share of the distance of touching centre lines by which members may be inside each other where events follow each
+other quickly.
 """
 
 TOGETHER = 1e-9

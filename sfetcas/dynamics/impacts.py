@@ -170,8 +170,9 @@ class Collision:
         return self._velocities(w), impulses, touching, lost
 
     def pressing(self, touching: Array, opening: Array) -> Array:
-        """Which of the rows (rows,) that touch push, of bool, for the accelerations ``opening`` with which rows open where
-        none pushes.
+        """Which of the rows (rows,) that touch push, of bool.
+
+        ``opening`` (rows,) are the accelerations with which rows open where none pushes.
         """
         taking, found = np.flatnonzero(touching), np.zeros(len(touching), bool)
         rows = self._signs[taking, None] * self._jacobian[self._rows[taking]]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, final
 
 import numpy as np
@@ -152,8 +152,9 @@ class Stages(Integrator):
         given = state.q, state.y, state.lam, begun.x, rates, state.unwrapped
         rubbing = self.system.rubbing
         rubs = None if rubbing is None else rubbing.idle(rubbing.displacements(state.y))
-        acting = {"acting": begun.touching, "held": 0.0 * begun.touching, "unilateral": self.system.unilateral}
-        memory: Memory | None = Memory(0.0, *given, remembered=begin, **acting, rubs=rubs)
+        still = 0.0 * begun.touching
+        start = Memory(0.0, *given, remembered=begin, acting=begun.touching, held=still, rubs=rubs)
+        memory: Memory | None = replace(start, unilateral=self.system.unilateral)
         self._sampler, self.record = Sampler(course.times, method.stages), StepRecord(method.stages)
         first = None if course.step is not None else max(FIRST * course.end, min(course.end, SHORTEST))
         while memory is not None:

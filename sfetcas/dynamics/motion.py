@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..contact.pressing import pressed
 from ..contact.touches import Touched
 from ..description.answers import MOTION
 from ..description.records import counted, plain, say
@@ -28,7 +29,6 @@ from ..mechanics.model import Model, assemble
 from ..mechanics.unilateral import UnilateralRows
 from ..solvers.redundancy import loose_rows
 from ..solvers.sharing import shared
-from ..contact.pressing import pressed
 from .friction import pushed_along, rubbed
 from .projecting import factor_closings
 
@@ -76,7 +76,9 @@ class Mover:
         if len(sample.unilateral):
             equations = self.acting(sample.unilateral, sample.acting)
             model = equations.model
-        loading = system.loading_of(model, sample.t) if len(sample.unilateral) else system.loading(self.factors(sample.t))
+        loading = (
+            system.loading_of(model, sample.t) if len(sample.unilateral) else system.loading(self.factors(sample.t))
+        )
         free = system.state_of(model, State(sample.q, sample.y, np.zeros(0), sample.unwrapped))
         point = equations.at(free, loading)
         forces = self.inertia.forces(sample.v, sample.a)

@@ -251,7 +251,14 @@ def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -
     near = np.delete(np.arange(len(at)), int(np.abs(at - here).argmax()))
     doubt = np.abs(a - _rates(at[near], here, quantities[near])[1]).max(initial=0.0) if len(at) > 2 else 0.0
     position = middle + (row @ quantities)[0]
-    given = own.after.unwrapped, begin.remembered, begin.acting, begin.lost + _rubbed(own, float(here[0])), begin.rubs, begin.unilateral
+    given = (
+        own.after.unwrapped,
+        begin.remembered,
+        begin.acting,
+        begin.lost + _rubbed(own, float(here[0])),
+        begin.rubs,
+        begin.unilateral,
+    )
     sample = Sample(t, q, (row @ np.array(y))[0], position, v / h, a / h**2, spin, *given)
     return sample, float(doubt) / h**2
 

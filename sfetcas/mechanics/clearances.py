@@ -93,8 +93,7 @@ class Clearance(Term):
         symbols = whole.sx_in()
         q, u, data, load, lam = symbols
         n = self.axes
-        sides = [[ca.vertsplit(side) for side in ca.horzsplit(part)] for part in (q, u)]
-        at, lines = data[n + 1 : n + 3], self._lines(*sides, data)
+        at, lines = data[n + 1 : n + 3], self._lines(_split(q), _split(u), data)
         for _ in range(self.steps):
             at = self._nearer(*lines, at)
         there = ca.vertcat(data[: n + 1], at, data[n + 3 :])
@@ -135,8 +134,7 @@ class Clearance(Term):
         """
         turns, places, _, size, _ = self.sizes
         q, u, data = ca.SX.sym("q", self.components, turns), ca.SX.sym("u", self.axes, places), ca.SX.sym("data", size)
-        sides = [[ca.vertsplit(side) for side in ca.horzsplit(part)] for part in (q, u)]
-        lines, at = self._lines(*sides, data), data[self.axes + 1 : self.axes + 3]
+        lines, at = self._lines(_split(q), _split(u), data), data[self.axes + 1 : self.axes + 3]
         for _ in range(self.steps):
             at = self._nearer(*lines, at)
         return ca.Function("places", [q, u, data], [at, _step(self, True)(*lines, at)])
@@ -167,7 +165,7 @@ def _step(kind: Clearance, free: bool) -> ca.Function:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """The rows of one kind in a model: which they are, and their sides, as of :class:`~sfetcas.mechanics.terms.Group`."""
+    """The rows of one kind in a model, and their sides, as of :class:`~sfetcas.mechanics.terms.Group`."""
 
     kind: Clearance
     approaches: list[Approach]
@@ -197,6 +195,10 @@ class Rows:
         return held, free
 
 
+def _split(sides: ca.SX) -> list[Side]:
+    return [ca.vertsplit(side) for side in ca.horzsplit(sides)]
+
+
 def _side_sizes(element: Element | None, axes: int) -> tuple[int, int, int]:
     """Numbers of rotations, strains and data of a member."""
     return (1, 0, axes) if element is None else (*element.sizes[:2], element.line_data)
@@ -221,8 +223,8 @@ def clearances_in(parts: Parts) -> Iterator[One]:
                 continue
             strains += tuple(segments.strains[number].tolist())
             lines += [parts.beams.tangent[number].ravel(), parts.beams.compliance[number].ravel()]
-        elements = [None if parts.scene.members[m].type == "rigid" else parts.element for m in near.members]
-        kind = Clearance(parts.element.space, *elements, *near.held)
+        one, other = (None if parts.scene.members[m].type == "rigid" else parts.element for m in near.members)
+        kind = Clearance(parts.element.space, one, other, *near.held)
         between = (starts[0] - starts[1])[:axes] / unit
         data = numbers(np.concatenate([between, [near.distance / unit, *at], *lines]))
         yield One(kind, near.contact, "", data, turns, (*places, *strains), near.name)

@@ -24,8 +24,8 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
 from .actuation import actuations_in
 from .beams import ELEMENT_DATA, Beams, Scales, beams_of, scales_of
-from .connections import connections_in, touches_in
 from .clearances import clearances_in
+from .connections import connections_in, touches_in
 from .contact_points import contact_points_in
 from .elements import Element, element_by_name
 from .laws import laws_in

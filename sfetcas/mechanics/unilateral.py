@@ -150,7 +150,7 @@ def all_stops(scene: Scene) -> Stops:
 def rows_of(model: Model) -> UnilateralRows:
     """The rows of a model in which all unilateral constraints of its scene are active; none where it has none."""
     scene, names = model.scene, model.row_names
-    spots = (*(model.mesh.spots or ()), *model.mesh.approaches)
+    spots: tuple[Spot | Approach, ...] = (*(model.mesh.spots or ()), *model.mesh.approaches)
     touching = [Unilateral("contacts", spot.contact, "touching", spot) for spot in spots]
     parts = (*unilaterals(scene), *touching)
     number = {name: i for i, name in enumerate(names)} if touching else {}
