@@ -238,7 +238,9 @@ def test_what_is_refused(change, message):
 
 @pytest.mark.fast
 def test_members_that_begin_inside_each_other_are_refused():
-    with pytest.raises((SceneError, SolveError), match="penetrate by 0.005 m at 0.5 and 0.8 of their lengths at t = 0"):
+    with pytest.raises(
+        (SceneError, SolveError), match=r"penetrate by 0\.005 m at 0\.5 and 0\.8 of their lengths at t = 0"
+    ):
         solve(bars(across(0.3, height=0.015)))
 
 

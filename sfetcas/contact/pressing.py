@@ -35,7 +35,7 @@ def _entries(fields: Fields) -> list[tuple[str, dict[str, Any]]]:
     """The contact and what is told of each place where members touch."""
     model, found = fields.model, list[tuple[str, dict[str, Any]]]()
     number = {name: i for i, name in enumerate(model.row_names)}
-    for rows in Rows.of(model):
+    for rows in Rows.of(model.connections, model.mesh):
         places, _ = rows.located(fields.state.q, fields.displaced)
         for near, at in zip(rows.approaches, places, strict=True):
             at_members = [_along(fields, near, side, float(at[side])) for side in (0, 1)]

@@ -86,7 +86,7 @@ class Approaching:
                 acted[part.spot.contact, frozenset(part.spot.members)] = held
         found = self._searched(memory)
         self.system = self._build(tuple(found.values()))
-        self._rows, self.over = list(Rows.of(self.system.model)), None
+        self._rows, self.over = list(Rows.of(self.system.model.connections, self.system.model.mesh)), None
         rows, kept = self.system.unilateral, len(before.unilateral) - len(before.model.mesh.approaches)
         lam = np.zeros(self.system.layout.lam)
         own = len(memory.lam) - len(before.model.mesh.approaches)

@@ -22,7 +22,7 @@ from .methods import Method, Radau
 from .stages import StageEquations
 from .steps import LAST_CHANGE, step_function
 
-__all__ = ["SHORTEST", "Memory", "Passed", "Stepper", "Taken", "Watching", "integrate"]
+__all__ = ["LONGER", "SHORTEST", "Memory", "Passed", "Stepper", "Taken", "Watching", "integrate"]
 
 
 SHORTEST = 5e-7

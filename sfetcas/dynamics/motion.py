@@ -325,13 +325,20 @@ class StopEvent:
         if self.side == "taut":
             what = "taut" if self.acts else "slack"
         elif self.where:
-            left = "hits it and leaves" if self.impulse else "leaves it"
+            touches, hits, leaves = BETWEEN if " and members." in self.where else ALONE
             sticks = self.side == "sticking"
-            what = f"{self.where} {'touches it' if self.acts else left}"
+            what = f"{self.where} {touches if self.acts else hits if self.impulse else leaves}"
             what = f"{self.where} {'sticks' if self.acts else 'slides'}" if sticks else what
         hit = f", after an impulse of {number_in_words(self.impulse, unit)}" if self.impulse else ""
         lost = f", {number_in_words(self.dissipated, 'N m')} dissipated" if self.dissipated else ""
         return f"{when}: {what}{hit}{lost}"
+
+
+ALONE = "touches it", "hits it and leaves", "leaves it"
+"""What a member does to an obstacle."""
+
+BETWEEN = "touch each other", "hit and leave each other", "leave each other"
+"""What members do to each other."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,23 +16,20 @@ Source: Konyukhov and Izadi 2015, Introduction to Computational Contact Mechanic
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar, final
+from typing import ClassVar, final
 
 import casadi as ca
 import numpy as np
 
 from ..mathematics.arrays import Array, Index, numbers
 from .elements import Element
-from .mesh import Approach
+from .mesh import Approach, Mesh
 from .parts import Parts
 from .rings import up_to
 from .segments import place_of_cut
-from .terms import One, Side, Term, name_of, rotation_gradient
-
-if TYPE_CHECKING:
-    from .model import Model
+from .terms import Group, One, Side, Term, name_of, rotation_gradient
 
 __all__ = ["PARALLEL", "Clearance", "Rows", "clearances_in"]
 
@@ -174,10 +171,10 @@ class Rows:
     data: Array
 
     @classmethod
-    def of(cls, model: Model) -> Iterator[Rows]:
-        """All of them in a model."""
-        known = {near.name: near for near in model.mesh.approaches}
-        for group in model.connections:
+    def of(cls, groups: Sequence[Group], mesh: Mesh) -> Iterator[Rows]:
+        """All of them among the terms of a model."""
+        known = {near.name: near for near in mesh.approaches}
+        for group in groups:
             if isinstance(group.kind, Clearance):
                 approaches = [known[row] for row in group.rows]
                 yield cls(group.kind, approaches, group.turns, group.places, group.data)
