@@ -177,6 +177,9 @@ class Closest:
     def samples(self, fields: Fields, member: str) -> Array:
         """Fractions (n,) of the length of a member between which it is nearly straight."""
         cuts = fields.model.mesh.cuts[member]
+        if self.scene.members[member].type == "rigid" and self.scene.center_lines[member].turning == 0.0:
+            # What is straight, and stays so, needs no short pieces; between shorter ones fewer may be near.
+            return np.linspace(0.0, 1.0, PIECES + 1)
         each = np.diff(cuts) * self.lengths[member] / (SLENDER * self.least[member])
         most = max(PIECES, MOST_PIECES // (len(cuts) - 1))
         counts = np.clip(np.ceil(each), PIECES, most).astype(int)
@@ -205,6 +208,15 @@ class Closest:
             return min((one.gap for one in self.found(fields, NEARBY * self.scene.size, [pair])), default=None)
         ends = self._gaps(fields, pair, np.array([0.0, 1.0]))[0].tolist()
         return min([*ends, *(one.gap for one in self.found(fields, np.inf, [pair]))])
+
+    def smallest_between(self, fields: Fields, contact: str) -> float | None:
+        """Smallest distance of the surfaces of members in a contact between them, m; None where it is large."""
+        pairs, reach = [pair for pair in self._between if pair.contact == contact], self.largest
+        while reach < 2.0 * NEARBY * self.scene.size:
+            if gaps := [near.gap for near in self.found(fields, min(reach, NEARBY * self.scene.size), pairs)]:
+                return min(gaps)
+            reach *= 2.0
+        return None
 
     # -- obstacles --------------------------------------------------------------------------------
 
@@ -452,6 +464,12 @@ class Closest:
         curvature[1, 1] = (1.0 - along[1] ** 2) / apart - np.einsum("ni,ni->n", n, k[1])
         curvature[0, 1] = curvature[1, 0] = (-both - along[0] * along[1]) / apart
         return along, curvature, apart, n
+
+    def half_square(self, fields: Fields, members: tuple[str, str], at: tuple[float, float]) -> tuple[Array, Array]:
+        """Slope (2,), m, and curvature (2, 2) of half the square of the distance of two members by both arc lengths."""
+        pair = Pair("", members, 0.0, 0.0)
+        slope, curvature, _ = self._half_square(fields, pair, np.array(at)[:, None])
+        return slope[:, 0], curvature[:, :, 0]
 
     def _half_square(self, fields: Fields, pair: Pair, at: Array) -> tuple[Array, Array, Array]:
         """Slope (2, n), m, and curvature (2, 2, n) of half the square of the distance, and the distance (n,), m.

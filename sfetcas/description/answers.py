@@ -119,6 +119,11 @@ def _supported(scene: Any, record: Any) -> bool:
     return bool(record.support != "free")
 
 
+def _told_of_members(scene: Any, contact: Any) -> bool:
+    """Whether places along members are told: in motions where these touch each other."""
+    return bool(contact.between_members or scene.analysis.type != "dynamic")
+
+
 def outlined(scene: Any, record: Any) -> bool:
     """Whether a member is flexible and its section has a shape alone, so that its fibres are linear elastic."""
     if record.type != "flexible":
@@ -178,11 +183,11 @@ magnets.NAME.energy | J | | statics, motion, parameters | minus the moment times
 magnets.NAME.torque | N m | x y z | statics, motion, parameters | of the fields, about the places of the magnet
 magnets.NAME.force | N | x y z | statics, motion, parameters | of fields that are not uniform
 contacts.NAME.force | N | x y z | statics, motion | on the member; of a stretch, and in motions, the resultant
-contacts.NAME.at | | | statics | fraction of the length, or [from, to]; null where nothing touches
+contacts.NAME.at | | | statics, motion | fraction of the length, or [from, to]; in motions between members
 contacts.NAME.gap | m | | statics, motion | smallest distance
-contacts.NAME.member | | | statics | which it touches; all are lists where it touches more than once
-contacts.NAME.other | | | statics | between members: the second one; the force is that on the first
-contacts.NAME.other_at | | | statics | fraction of the length of the second one
+contacts.NAME.member | | | statics, motion | which it touches; all are lists where it touches more than once
+contacts.NAME.other | | | statics, motion | between members: the second one; the force is that on the first
+contacts.NAME.other_at | | | statics, motion | fraction of the length of the second one
 contacts.NAME.touching | | | motion | what touches: `nodes.tip`, `members.rod at 0.25`; a list
 contacts.NAME.friction | N | x y z | statics, motion | with `friction`: the part of the force along the surfaces
 contacts.NAME.sticking | | | statics, motion | with `friction`: whether it does; in motions a list of what does
@@ -233,6 +238,11 @@ APPLIES: dict[str, Callable[[Any, Any], bool]] = {
     "tendons.NAME.far_tension": lambda scene, tendon: tendon.friction is not None,
     "tendons.NAME.tensions": lambda scene, tendon: tendon.friction is not None,
     "tendons.NAME.released": lambda scene, tendon: tendon.friction is not None,
+    "contacts.NAME.at": _told_of_members,
+    "contacts.NAME.member": _told_of_members,
+    "contacts.NAME.other": _told_of_members,
+    "contacts.NAME.other_at": _told_of_members,
+    "contacts.NAME.touching": lambda scene, contact: not contact.between_members,
     "contacts.NAME.friction": lambda scene, contact: contact.friction > 0.0,
     "contacts.NAME.sticking": lambda scene, contact: contact.friction > 0.0,
     "rings.NAME.drive": lambda scene, ring: ring.driven,

@@ -88,7 +88,7 @@ class Contact(Record):
         Coulomb's coefficient: the largest force along the surfaces over that across them; in statics, where it counts
         in which order the steps come, and in motions.
     restitution : 1
-        Speed across the obstacle after an impact over that before, from 0 to 1; of motions alone.
+        Speed across the surfaces after an impact over that before, from 0 to 1; of motions alone.
     """
 
     type: Literal["point", "line", "plane", "circle", "cylinder", "sphere", "members"]

@@ -78,7 +78,9 @@ def check_contact(
     """
     for name, contact in contacts.items():
         where = "contacts", name
-        if obstacle(contact, space).kind == "sharp":
+        if contact.between_members:
+            _check_between(analysis, name, contacts)
+        elif obstacle(contact, space).kind == "sharp":
             message = f"found a {contact.type} that members slide over, accepted in a motion: a plane, circle, cylinder"
             raise SceneError(f"{message} or sphere", (*where, "type"))
         if analysis.integrator in ("idas", "conserving"):
@@ -89,6 +91,21 @@ def check_contact(
             if members[member].type == "flexible" and section is not None and not section.mass(HEAVY).all():
                 message = f"found the member {member!r}, whose section is without mass, so that it would have to jump"
                 raise SceneError(f"{message}, accepted: a small rhoA", where)
+
+
+def _check_between(analysis: Analysis, name: str, contacts: Mapping[str, Contact]) -> None:
+    """Refuse contact between members with what motions do not know beside it."""
+    for other, contact in contacts.items():
+        if contact.friction > 0.0:
+            what = "between members" if contact.between_members else "beside contact between members"
+            message = f"found {what} in a motion, accepted: with analysis.type = 'static', or 0"
+            raise SceneError(message, ("contacts", other, "friction"))
+    if analysis.integrator == "generalised-alpha":
+        found = "found with the integrator 'generalised-alpha', which does not follow where members touch each other"
+        raise SceneError(f"{found}, accepted: radau-3, radau-2", ("contacts", name))
+    if analysis.initial == "equilibrium":
+        message = "found 'equilibrium' with contact between members, accepted: a motion that begins undeformed"
+        raise SceneError(message, ("analysis", "initial"))
 
 
 def check_unilateral(analysis: Analysis, springs: Mapping[str, Spring], tendons: Mapping[str, Tendon]) -> None:

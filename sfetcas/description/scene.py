@@ -1035,7 +1035,7 @@ def _check_points(scene: Scene) -> None:
 def _why_points(scene: Scene, name: str) -> str:
     """What of a contact makes it an unknown where members touch; nothing where it does not."""
     contact = scene.contacts[name]
-    if contact.between_members:
+    if contact.between_members and scene.analysis.type != "dynamic":
         return "contact between members"
     if contact.member_radius > 0.0:
         return "a radius of members on an obstacle"
@@ -1064,6 +1064,9 @@ def _check_between_members(scene: Scene, name: str) -> None:
         if contact_radius(contact, record, scene.sections) is None:
             message = f"found the member {member!r}, whose section has no radius, accepted: the key 'radius'"
             raise SceneError(f"{message}, or a section with shape = 'circle' or 'tube' of one radius", where)
+        if scene.analysis.type == "dynamic" and record.type == "rigid" and scene.center_lines[member].turning:
+            message = f"found the curved rigid member {member!r} in a motion, accepted: straight or flexible ones"
+            raise SceneError(message, where)
         if record.off_line(scene.sections):
             message = f"found the member {member!r}, whose section has {record.off_line(scene.sections)}"
             raise SceneError(f"{message}, accepted: members without touch each other", where)

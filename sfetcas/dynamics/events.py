@@ -38,7 +38,9 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.interpolation import evaluation
 from ..mechanics.equations import State
+from ..mechanics.mesh import Approach
 from ..mechanics.rubbing import STILL, Rubs
+from ..mechanics.unilateral import Unilateral
 from .impacts import Collision, Impacts
 from .integrating import SHORTEST, Memory, Passed, Stepper, Taken
 from .sampling import turned_by
@@ -53,8 +55,8 @@ class Event:
     Attributes
     ----------
     t : float
-    row : int
-        Its number among the unilateral ones.
+    part : Unilateral
+        What its row is.
     acts : bool
         Whether it acts from then on.
     impulse : float
@@ -66,7 +68,7 @@ class Event:
     """
 
     t: float
-    row: int
+    part: Unilateral
     acts: bool
     impulse: float
     lost: float
@@ -110,15 +112,23 @@ class Events:
         Dimensionless time of the whole motion.
     late : float
         How far members may be inside obstacles where events follow each other quickly, unit of length.
+    before : Events or None
+        Those of the motion up to now, in a system with other rows between members.
 
     Attributes
     ----------
     found : list of Event
     """
 
-    def __init__(self, stepper: Stepper, span: float, late: float = 0.0) -> None:
-        self.stepper, self.system, self._span, self._late = stepper, stepper.system, span, late
-        self._of_obstacles = np.array([part.spot is not None for part in stepper.system.unilateral.parts])
+    def __init__(self, stepper: Stepper, span: float, late: float = 0.0, before: Events | None = None) -> None:
+        self.stepper, self.system, self._span = stepper, stepper.system, span
+        parts, unit = stepper.system.unilateral.parts, stepper.system.model.scales.length
+        self._of_obstacles = np.array([part.spot is not None for part in parts], bool)
+        between = [part.spot.distance / unit if isinstance(part.spot, Approach) else np.inf for part in parts]
+        self._late = np.minimum(late, INSIDE * np.array(between))
+        # Hops that were no further than is accepted, one after the other, of each row beside members that may touch.
+        self._rocks, self._small = bool(np.isfinite(between).any()), np.zeros(len(parts), int)
+        self._accepted = np.where(self._of_obstacles, late, 0.0)
         self.rows, self.signs = self.system.unilateral.rows, self.system.unilateral.signs
         self._impacts, self.found = Impacts(self.system), list[Event]()
         # When it happened last, and how often at the same time before.
@@ -132,6 +142,9 @@ class Events:
         # Times of events; times and speeds of the last impacts, of all rows and of each.
         self._times: list[float] = []
         self._hits: dict[int, list[tuple[float, float]]] = {}
+        if before is not None:
+            self.found, self._times = before.found, before._times
+            self._last, self._again = before._last, before._again
 
     # -- begin ----------------------------------------------------------------------------------------
 
@@ -141,10 +154,21 @@ class Events:
         ``h`` is the expected length of a step.
         """
         touching = memory.acting > 0.0
-        idle = replace(memory, acting=np.zeros(len(self.rows)))
+        if not len(touching):
+            return memory
+        idle, known = replace(memory, acting=np.zeros(len(self.rows))), len(self.found)
         after = self._after(idle, touching, np.zeros(len(self.rows), bool), h)
-        self.found[:] = [event for event in self.found if event.impulse]
+        self.found[known:] = [event for event in self.found[known:] if event.impulse]
         return after
+
+    def resumed(self, memory: Memory, h: float) -> Memory:
+        """The state from which the motion goes on in a system with other rows, with those that act."""
+        nothing = np.zeros(len(self.rows), bool)
+        return self._after(memory, nothing, nothing, h) if memory.acting.any() else memory
+
+    def longest(self, memory: Memory) -> float:
+        """No step is too long."""
+        return np.inf
 
     # -- within a step --------------------------------------------------------------------------------
 
@@ -160,7 +184,7 @@ class Events:
         if (together := self._together(taken, share)) is not None:
             return together
         self._refuse_endless(taken.begin)
-        steps = self._advanced(taken, share) if share * taken.h > SHORTEST else []
+        steps = self.advanced(taken, share) if share * taken.h > SHORTEST else []
         memory = steps[-1].after if steps else taken.begin
         acting = memory.acting > 0.0
         if halted is not None and share == halted:
@@ -190,7 +214,7 @@ class Events:
         for soon in SOON * self._span:
             if soon < max(first, self._last + SHORTEST - begin.t):
                 return None
-            steps = self._advanced(taken, min((self._last + soon - begin.t) / taken.h, 1.0))
+            steps = self.advanced(taken, min((self._last + soon - begin.t) / taken.h, 1.0))
             memory = steps[-1].after
             opened = self._opened(memory.q, memory.y, memory.t, memory)
             if (opened >= -allowed).all() and self._speed(memory) > -BACK:
@@ -205,18 +229,18 @@ class Events:
             ceases = acting & (now.forces < -now.rounding)
         return Passed(steps, self._after(memory, closes, ceases, taken.h))
 
-    def _at(self, taken: Taken, share: float) -> Memory:
+    def at(self, taken: Taken, share: float) -> Memory:
         """The state after a share of a step that was taken."""
         if share == 1.0 and self.stepper.method.stages > 1:
             return taken.after
-        return self._advanced(taken, share)[-1].after if share * taken.h > SHORTEST else taken.begin
+        return self.advanced(taken, share)[-1].after if share * taken.h > SHORTEST else taken.begin
 
     def _refuse_endless(self, memory: Memory) -> None:
         """Refuse events that follow each other without an end of them in sight."""
         self._times.append(memory.t)
         if len(self._times) > MOST and memory.t - self._times[-MOST - 1] < BRIEF * self._span:
             seconds = memory.t * self.stepper.time
-            names = ", ".join(dict.fromkeys(self.system.unilateral.names[event.row] for event in self.found[-MOST:]))
+            names = ", ".join(dict.fromkeys(event.part.where for event in self.found[-MOST:]))
             detail = f"at {seconds:.9g} s one impact or release follows another, {MOST} of them, of {names}"
             raise SolveError(Status.STOPPED, detail, memory)
 
@@ -240,7 +264,7 @@ class Events:
         falling = len(speeds) > REPEATED and bool((np.diff(speeds) < 0.0).all() and (np.diff(times, 2) < 0.0).all())
         return falling and speed * (times[-1] - times[-2]) < EBBED
 
-    def _advanced(self, taken: Taken, share: float) -> list[Taken]:
+    def advanced(self, taken: Taken, share: float) -> list[Taken]:
         """Steps from the begin of one that was taken over a share of it.
 
         Of a method with one stage it takes several, between which the motion can be interpolated.
@@ -269,7 +293,7 @@ class Events:
             return None
 
         def left(share: float) -> float:
-            return float((self._openings(self._at(taken, share))[idle] + ROUNDING).min())
+            return float((self._openings(self.at(taken, share))[idle] + ROUNDING).min())
 
         low = 0.0
         for high in (*nearest, *shares[shares > nearest[-1]].tolist()):
@@ -333,7 +357,7 @@ class Events:
         ]
 
         def left(share: float) -> float:
-            return self._least(self._at(taken, share), h)
+            return self._least(self.at(taken, share), h)
 
         for share in doubtful:
             if left(share) < 0.0:
@@ -379,7 +403,7 @@ class Events:
         begun = BACK if self._speed(taken.begin) <= BACK else 0.0
 
         def left(share: float) -> float:
-            return self._speed(self._at(taken, share)) + begun
+            return self._speed(self.at(taken, share)) + begun
 
         if left(0.0) <= 0.0:
             return 0.0
@@ -397,7 +421,7 @@ class Events:
         while high - low > XTOL:
             share = 0.5 * (low + high)
             try:
-                speed = self._speed(self._at(taken, share))
+                speed = self._speed(self.at(taken, share))
             except SolveError:
                 speed = -np.inf
             low, high = (share, high) if speed > 0.0 else (low, share)
@@ -419,7 +443,11 @@ class Events:
         speeds = collision.speeds(before, closes)
         ebbed = closes.copy() if self._again > HOPS else self._ebbing(memory.t, speeds)
         # What has hopped no further than is accepted does not rebound once more.
-        quiet = self._of_obstacles & (speeds > 0.0) & (speeds * (memory.t - self._hit) < self._late)
+        hop = speeds * (memory.t - self._hit)
+        quiet = self._of_obstacles & (speeds > 0.0) & (hop < self._late)
+        if self._rocks:
+            self._small = np.where(speeds > 0.0, np.where(hop < self._accepted, self._small + 1, 0), self._small)
+            ebbed = ebbed | (closes & (self._small > CALM))
         self._hit = np.where(speeds > 0.0, memory.t, self._hit)
         velocity, impulses, touching, lost = collision.solved(before | ebbed, closes & ~ebbed, quiet)
         opened = self._opened(memory.q, memory.y, memory.t, memory)
@@ -434,11 +462,22 @@ class Events:
         hardest = int(np.argmax(impulses))
         for i in np.flatnonzero((acting != before) | (impulses > 0.0)).tolist():
             own = lost if i == hardest else 0.0
-            self.found.append(Event(memory.t, i, bool(acting[i]), float(impulses[i]), own))
+            self.found.append(
+                Event(memory.t, self.system.unilateral.parts[i], bool(acting[i]), float(impulses[i]), own)
+            )
         if rubs is not None and memory.rubs is not None:
             changed = (rubs.sticks != memory.rubs.sticks) & acting[self._rough]
             for k in np.flatnonzero(changed).tolist():
-                self.found.append(Event(memory.t, int(self._rough[k]), bool(rubs.sticks[k]), 0.0, 0.0, sticks=True))
+                self.found.append(
+                    Event(
+                        memory.t,
+                        self.system.unilateral.parts[self._rough[k]],
+                        bool(rubs.sticks[k]),
+                        0.0,
+                        0.0,
+                        sticks=True,
+                    )
+                )
         return there
 
     def _resting(self, memory: Memory, touching: Array, slips: Array | None) -> tuple[Memory, Array]:
@@ -483,6 +522,10 @@ class Events:
             collision = self._impacts.at(memory)
         # Where it did not hold at this time in a longer step, a shorter one is asked.
         h = max(self._length(h) * SHORTER**self._again, SHORTEST / SHORTER)
+        if self._rocks and memory.rubs is None:
+            # Of many choices the one for accelerations is right, or nearly so.
+            idle = self._soon(replace(memory, acting=np.zeros(len(acting))), h)
+            acting = self._impacts.at(memory).pressing(touching, 2.0 * idle.opened / h**2)
         best, least = acting, len(acting) + 1
         while h > SHORTEST:
             tried: set[bytes] = set()
@@ -615,6 +658,9 @@ SOON = 1e-3 * 0.25 ** np.arange(4)
 HOPS = 2
 """Events one after the other at the same time, after which rows that close stay closed."""
 
+CALM = 3
+"""Hops no further than is accepted, after which what rocks to and fro on other members and obstacles is at rest."""
+
 CREEPING = 1e-3
 """Share of what is accepted by which a member may go further inside an obstacle from one event to the next."""
 
@@ -650,6 +696,11 @@ LOOKS = 8
 
 ROUNDING = 1e-12
 """Of openings, unit of length or rad."""
+
+INSIDE = 1e-6
+"""Share of the distance of touching centre lines by which members may be inside each other where events follow each
+other quickly.
+"""
 
 TOGETHER = 1e-9
 """Opening, unit of length or rad, up to which a row closes at the same time as another one."""

@@ -169,6 +169,17 @@ class Collision:
             touching[taking] = ((found > 0.0) & (rebound <= slow)) | (left > -slow)
         return self._velocities(w), impulses, touching, lost
 
+    def pressing(self, touching: Array, opening: Array) -> Array:
+        """Which of the rows (rows,) that touch push, of bool.
+
+        ``opening`` (rows,) are the accelerations with which rows open where none pushes.
+        """
+        taking, found = np.flatnonzero(touching), np.zeros(len(touching), bool)
+        rows = self._signs[taking, None] * self._jacobian[self._rows[taking]]
+        back = self._onto(self._always, rows.T, np.zeros(len(self._always)))
+        found[taking] = _complementary(rows @ back, -opening[taking]) > 0.0
+        return found
+
     def _rough(self, taking: Index) -> tuple[Index, list[Rough]]:
         """Rows along the obstacles that rub, of the unilateral rows that take part, and how they belong together."""
         if self._rubbing is None:

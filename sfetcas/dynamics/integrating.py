@@ -17,11 +17,12 @@ from ..mathematics.kernels import Batch
 from ..mechanics.masses import Observables
 from ..mechanics.rubbing import Rubs
 from ..mechanics.segments import pulled_place
+from ..mechanics.unilateral import NONE, UnilateralRows
 from .methods import Method, Radau
 from .stages import StageEquations
 from .steps import LAST_CHANGE, step_function
 
-__all__ = ["SHORTEST", "Memory", "Passed", "Stepper", "Taken", "Watching", "integrate"]
+__all__ = ["LONGER", "SHORTEST", "Memory", "Passed", "Stepper", "Taken", "Watching", "integrate"]
 
 
 SHORTEST = 5e-7
@@ -62,6 +63,8 @@ class Memory:
         Energy lost in impacts, and by friction at obstacles, so far.
     rubs : Rubs or None
         What the places that rub on obstacles do; None where there are none.
+    unilateral : UnilateralRows
+        The constraints of :attr:`acting`, which change where members come near to each other.
     """
 
     t: float
@@ -78,6 +81,7 @@ class Memory:
     held: Array = field(default_factory=lambda: np.zeros(0))
     lost: float = 0.0
     rubs: Rubs | None = None
+    unilateral: UnilateralRows = NONE
 
     @property
     def position(self) -> Array:
@@ -142,10 +146,13 @@ class Taken:
 
 @dataclass(frozen=True, eq=False)
 class Passed:
-    """What has happened within a time step: the steps up to then, perhaps none, and the state after it."""
+    """What has happened within a time step: the steps up to then, perhaps none, the state after it, and whether the
+    system is another one from then on.
+    """
 
     steps: list[Taken]
     after: Memory
+    over: bool = False
 
 
 class Watching(Protocol):
@@ -153,6 +160,9 @@ class Watching(Protocol):
 
     def within(self, taken: Taken) -> Passed | None:
         """What happens first in a step that was taken; None where nothing does."""
+
+    def longest(self, memory: Memory) -> float:
+        """The longest step that may be taken from a state."""
 
 
 def _arms(group: Observables) -> Array:
@@ -356,7 +366,7 @@ def integrate(
     tolerance : instead of ``step``: permitted error of a step, over the unit of length
     first : length of the first step that is tried
     beyond : time after the last break up to which loads and motions are smooth
-    events : what ends steps where something happens, after which the integration begins anew
+    events : what ends steps where something happens, after which the integration begins anew, or is over
 
     Raises
     ------
@@ -370,7 +380,7 @@ def integrate(
                 going = _Fixed(stepper, step)
             else:
                 assert tolerance is not None
-                going = _Adaptive(stepper, tolerance, first)
+                going = _Adaptive(stepper, tolerance, first, events)
             passed: Passed | None = None
             for taken in going.until(memory, end):
                 passed = None if events is None else events.within(taken)
@@ -378,6 +388,8 @@ def integrate(
                 memory = taken.after if passed is None else passed.after
                 if passed is not None:
                     break
+            if passed is not None and passed.over:
+                return
             # Of two first steps each is half as long as what is tried: event by event they would become ever shorter.
             first = going.h if passed is None or going.h is None else max(LONGER * going.h, LONGER * SHORTEST)
             if passed is None or end - memory.t <= tolerances.DECIMAL * end:
@@ -430,8 +442,8 @@ class _Fixed:
 class _Adaptive:
     """Steps by the error up to a break."""
 
-    def __init__(self, stepper: Stepper, tolerance: float, first: float | None) -> None:
-        self._stepper, self._tolerance, self.h = stepper, tolerance, first
+    def __init__(self, stepper: Stepper, tolerance: float, first: float | None, events: Watching | None) -> None:
+        self._stepper, self._tolerance, self.h, self._events = stepper, tolerance, first, events
         s = stepper.method.stages
         # Order in h of what a step differs from how the one before went on.
         self._order = s + 1 if s > 1 else 3
@@ -439,14 +451,14 @@ class _Adaptive:
     def until(self, memory: Memory, end: float) -> Iterator[Taken]:
         """The steps."""
         span = end - memory.t
-        h = min(span if self.h is None else self.h, span)
+        h = min(span if self.h is None else self.h, span, self._longest(memory))
         least = tolerances.DECIMAL * span
         for taken in self._begun(memory, h, least):
             memory = taken.after
             yield taken
         h = self.h = min(self.h or h, span)
         while end - memory.t > least:
-            left = end - memory.t
+            left, h = end - memory.t, min(h, self._longest(memory))
             # The last steps share what is left evenly.
             h = left if left <= h * 1.0001 else 0.5 * left if left < 2.0 * h else h
             taken = self._stepper.step(memory, h)
@@ -459,6 +471,9 @@ class _Adaptive:
             memory = taken.after
             yield taken
             h = self.h = max(self._scaled(h, error, GROWTH), least)
+
+    def _longest(self, memory: Memory) -> float:
+        return np.inf if self._events is None else self._events.longest(memory)
 
     def _scaled(self, h: float, error: float, most: float) -> float:
         share = 0.25 if not np.isfinite(error) else 0.9 * max(error, 1e-12) ** (-1.0 / self._order)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, final
 
 import numpy as np
@@ -12,8 +12,9 @@ import numpy as np
 from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
+from .approaching import Approaching
 from .events import Event, Events
-from .integrating import SHORTEST, Memory, Stepper, Taken, integrate
+from .integrating import LONGER, SHORTEST, Memory, Stepper, Taken, integrate
 from .methods import Method
 from .sampling import Sample, Sampler, StepRecord
 from .stages import StageEquations
@@ -34,6 +35,8 @@ class InitialState:
         Quantities that carry mass or are damped, and their rates.
     touching : ndarray (rows,)
         Unilateral constraints that may act at once: 1 of those that are closed, else 0.
+    near : Approaching or None
+        What follows members that may touch each other.
     """
 
     state: State
@@ -41,6 +44,7 @@ class InitialState:
     x: Array
     v: Array
     touching: Array = field(default_factory=lambda: np.zeros(0))
+    near: Approaching | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,11 +141,11 @@ class Stages(Integrator):
         self, system: StageEquations, progress: Callable[[float], Any] | None = None, *, method: Method
     ) -> None:
         super().__init__(system, progress)
-        self._stepper, self._sampler = Stepper(system, method), Sampler([], method.stages)
+        self._method, self._sampler = method, Sampler([], method.stages)
 
     def samples(self, begun: InitialState, course: TimeGrid) -> Iterator[Sample]:
         """States interpolated by polynomials through ends of steps; as of :meth:`Integrator.samples`."""
-        stepper, method, state = self._stepper, self._stepper.method, begun.state
+        method, state, near = self._method, begun.state, begun.near
         rates = np.zeros((method.kept, len(begun.x)))
         rates[0] = begun.v
         begin = self.system.memory.begun
@@ -149,15 +153,42 @@ class Stages(Integrator):
         rubbing = self.system.rubbing
         rubs = None if rubbing is None else rubbing.idle(rubbing.displacements(state.y))
         still = 0.0 * begun.touching
-        memory = Memory(0.0, *given, remembered=begin, acting=begun.touching, held=still, rubs=rubs)
+        start = Memory(0.0, *given, remembered=begin, acting=begun.touching, held=still, rubs=rubs)
+        memory: Memory | None = replace(start, unilateral=self.system.unilateral)
         self._sampler, self.record = Sampler(course.times, method.stages), StepRecord(method.stages)
         first = None if course.step is not None else max(FIRST * course.end, min(course.end, SHORTEST))
+        while memory is not None:
+            memory = memory if near is None else near.renewed(memory)
+            stepper = Stepper(self.system if near is None else near.system, method)
+            for taken in self._steps(stepper, memory, course, first, near):
+                within = taken.begin.t < course.end * (1.0 - tolerances.DECIMAL)
+                if within:
+                    self._judge(taken)
+                self.record.feed(taken)
+                yield from self._sampler.feed(taken)
+                if within:
+                    self.proceed(taken.after.t)
+                first = None if first is None else max(LONGER * taken.h, LONGER * SHORTEST)
+            memory = None if near is None else near.over
+            if memory is not None and course.end - memory.t <= tolerances.DECIMAL * course.end:
+                memory = None
+        yield from self.rest()
+
+    def _steps(
+        self, stepper: Stepper, memory: Memory, course: TimeGrid, first: float | None, near: Approaching | None
+    ) -> Iterator[Taken]:
+        """The steps from a state to the end, or until members come near to each other that have not been so before."""
         late = LATE * course.accuracy * course.size * 0.5**course.rounds
-        events = Events(stepper, course.end, late) if len(self.system.unilateral) else None
+        events: Events | None = None
+        if near is not None:
+            events = near.watching(stepper, course.end, late)
+        elif len(self.system.unilateral):
+            events = Events(stepper, course.end, late)
         if events is not None:
             self.events = events.found
-            memory = events.begun(memory, course.step or first or course.end)
-        steps = integrate(
+            h = course.step or first or course.end
+            memory = events.begun(memory, h) if memory.t == 0.0 else events.resumed(memory, h)
+        yield from integrate(
             stepper,
             memory,
             course.breaks,
@@ -165,17 +196,8 @@ class Stages(Integrator):
             tolerance=self._tolerance(course),
             first=first,
             beyond=course.beyond,
-            events=events,
+            events=events if near is None else near,
         )
-        for taken in steps:
-            within = taken.begin.t < course.end * (1.0 - tolerances.DECIMAL)
-            if within:
-                self._judge(taken)
-            self.record.feed(taken)
-            yield from self._sampler.feed(taken)
-            if within:
-                self.proceed(taken.after.t)
-        yield from self.rest()
 
     def rest(self) -> Iterator[Sample]:
         """Samples of the last steps, where there are no further ones to interpolate with."""
@@ -190,9 +212,9 @@ class Stages(Integrator):
 
     def _tolerance(self, course: TimeGrid) -> float:
         """Tolerance of steps, in the unit of length; each round has steps of about half the length."""
-        order, stages = self._stepper.method.order, self._stepper.method.stages
+        order, stages = self._method.order, self._method.stages
         of_step = stages + 1 if stages > 1 else 3
-        first = (self._stepper.method.gain * course.accuracy) ** (of_step / order)
+        first = (self._method.gain * course.accuracy) ** (of_step / order)
         return float(course.size * first * 2.0 ** (-of_step * course.rounds))
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..contact.pressing import pressed
 from ..contact.touches import Touched
 from ..description.answers import MOTION
 from ..description.records import counted, plain, say
@@ -25,6 +26,7 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
 from ..mechanics.memory import Remembering
 from ..mechanics.model import Model, assemble
+from ..mechanics.unilateral import UnilateralRows
 from ..solvers.redundancy import loose_rows
 from ..solvers.sharing import shared
 from .friction import pushed_along, rubbed
@@ -51,17 +53,17 @@ class Mover:
         self.equations, self.inertia, self.time, self.factors = equations, inertia, time, factors
         self.model: Model = equations.model
         self.memory, self.unilateral = Remembering(self.model), inertia.system.unilateral
-        self._models: dict[bytes, Equations] = {}
+        self._models: dict[object, Equations] = {}
         self._redundant: bool | None = None
 
     def event(self, event: Event) -> StopEvent:
         """What happens to a unilateral constraint, by name."""
-        scales, part = self.model.scales, self.unilateral.parts[event.row]
+        scales, part = self.model.scales, event.part
         turns = part.table == "springs" and self.model.scene.springs[part.name].type == "rotational"
         side = "taut" if part.table == "tendons" else part.side
         side = "sticking" if event.sticks else side
         impulse = event.impulse * (scales.moment if turns else scales.force) * self.time
-        where = self.unilateral.names[event.row]
+        where = part.where
         lost, spot = event.lost * scales.moment, part.spot
         return StopEvent(event.t * self.time, where, side, event.acts, impulse, lost, turns, spot.where if spot else "")
 
@@ -71,10 +73,12 @@ class Mover:
         if self.memory.size:
             model = self.memory.model_with(sample.remembered)
             equations = equations.remembering(model)
-        if len(self.unilateral):
-            equations = self.acting(sample.acting)
+        if len(sample.unilateral):
+            equations = self.acting(sample.unilateral, sample.acting)
             model = equations.model
-        loading = system.loading_of(model, sample.t) if len(self.unilateral) else system.loading(self.factors(sample.t))
+        loading = (
+            system.loading_of(model, sample.t) if len(sample.unilateral) else system.loading(self.factors(sample.t))
+        )
         free = system.state_of(model, State(sample.q, sample.y, np.zeros(0), sample.unwrapped))
         point = equations.at(free, loading)
         forces = self.inertia.forces(sample.v, sample.a)
@@ -111,14 +115,20 @@ class Mover:
             found[spot.name] = three(forces[k]) * self.model.scales.force, bool(rubs.sticks[k])
         return found
 
-    def acting(self, acting: Array) -> Equations:
+    @property
+    def free(self) -> Equations:
+        """The equations of the model in which no unilateral constraint acts."""
+        return self.acting(self.unilateral, np.zeros(len(self.unilateral)))
+
+    def acting(self, rows: UnilateralRows, acting: Array) -> Equations:
         """The equations of the model in which unilateral constraints act as told, (rows,), 1 or 0."""
-        found = self._models.get(acting.tobytes())
+        model = self.model
+        mesh = rows.mesh(model.mesh, acting)
+        choice = mesh.stops, mesh.spots, mesh.approaches
+        found = self._models.get(choice)
         if found is None:
-            model = self.model
-            mesh = self.unilateral.mesh(model.mesh, acting)
             alone = assemble(model.scene, mesh, assembly=model.assembly, scales=model.scales, like=model)  # type: ignore[arg-type]
-            found = self._models[acting.tobytes()] = Equations(alone, kernels="interpreted")
+            found = self._models[choice] = Equations(alone, kernels="interpreted")
         return found
 
     def _balanced(self, equations: Equations, free: State, balanced: Any) -> State:
@@ -130,7 +140,7 @@ class Mover:
         factor_closings(equations, point)
         right = np.concatenate([-point.residual[:n], np.zeros(equations.rows)])
         state = replace(free, lam=np.asarray(equations.solver.solve(right)[n:]))
-        if self._redundant is False and not len(self.unilateral):
+        if self._redundant is False and not self.model.scene.hits:
             return state
         # What is straight where it begins may be bent later, but hardly the other way round.
         loose = loose_rows(equations, point)
@@ -234,7 +244,9 @@ class MotionState(Configuration):
         if not scene.contacts:
             return {}
         touched, found = Touched.of(self.fields), dict[str, dict[str, Any]]()
-        for name in scene.contacts:
+        between = [name for name, one in scene.contacts.items() if one.between_members]
+        found |= pressed(self.fields, between) if between else {}
+        for name in scene.obstacles:
             force = sum((force for _, _, force in self.pushes(name)), np.zeros(3))
             spots = [spot for spot in model.mesh.spots or () if spot.contact == name]
             touching = [spot.where for spot in spots]
@@ -313,13 +325,20 @@ class StopEvent:
         if self.side == "taut":
             what = "taut" if self.acts else "slack"
         elif self.where:
-            left = "hits it and leaves" if self.impulse else "leaves it"
+            touches, hits, leaves = BETWEEN if " and members." in self.where else ALONE
             sticks = self.side == "sticking"
-            what = f"{self.where} {'touches it' if self.acts else left}"
+            what = f"{self.where} {touches if self.acts else hits if self.impulse else leaves}"
             what = f"{self.where} {'sticks' if self.acts else 'slides'}" if sticks else what
         hit = f", after an impulse of {number_in_words(self.impulse, unit)}" if self.impulse else ""
         lost = f", {number_in_words(self.dissipated, 'N m')} dissipated" if self.dissipated else ""
         return f"{when}: {what}{hit}{lost}"
+
+
+ALONE = "touches it", "hits it and leaves", "leaves it"
+"""What a member does to an obstacle."""
+
+BETWEEN = "touch each other", "hit and leave each other", "leave each other"
+"""What members do to each other."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array, unit
 from ..mathematics.interpolation import differentiation, evaluation
 from ..mechanics.rubbing import Rubs
+from ..mechanics.unilateral import NONE, UnilateralRows
 from .integrating import Memory, Taken
 
 __all__ = ["Sample", "Sampler", "StepRecord", "between", "turned_by"]
@@ -58,6 +59,8 @@ class Sample:
         Energy lost in impacts, and by friction at obstacles, so far.
     rubs : Rubs or None
         What the places that rub on obstacles do, and the directions of sliding a little earlier.
+    unilateral : UnilateralRows
+        The constraints of :attr:`acting`.
     """
 
     t: float
@@ -72,6 +75,7 @@ class Sample:
     acting: Array = field(default_factory=lambda: np.zeros(0))
     lost: float = 0.0
     rubs: Rubs | None = None
+    unilateral: UnilateralRows = NONE
 
 
 class Sampler:
@@ -247,7 +251,14 @@ def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -
     near = np.delete(np.arange(len(at)), int(np.abs(at - here).argmax()))
     doubt = np.abs(a - _rates(at[near], here, quantities[near])[1]).max(initial=0.0) if len(at) > 2 else 0.0
     position = middle + (row @ quantities)[0]
-    given = own.after.unwrapped, begin.remembered, begin.acting, begin.lost + _rubbed(own, float(here[0])), begin.rubs
+    given = (
+        own.after.unwrapped,
+        begin.remembered,
+        begin.acting,
+        begin.lost + _rubbed(own, float(here[0])),
+        begin.rubs,
+        begin.unilateral,
+    )
     sample = Sample(t, q, (row @ np.array(y))[0], position, v / h, a / h**2, spin, *given)
     return sample, float(doubt) / h**2
 
@@ -276,7 +287,7 @@ def between(samples: Sequence[Sample], t: float) -> Sample:
         return np.tensordot(row, np.array([getattr(sample, part) for sample in samples]), 1)
 
     q = turned_by(near.q, np.einsum("n,nra->ra", row, turns))
-    given = near.unwrapped, near.remembered, near.acting, near.lost, near.rubs
+    given = near.unwrapped, near.remembered, near.acting, near.lost, near.rubs, near.unilateral
     return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), mean("spin"), *given)
 
 

@@ -25,11 +25,12 @@ from ..mathematics.threads import single_threaded
 from ..mechanics.equations import Equations, State
 from ..mechanics.law_limits import first_beyond_laws
 from ..mechanics.masses import masses_of
-from ..mechanics.mesh import Mesh
+from ..mechanics.mesh import Approach, Mesh
 from ..mechanics.model import Model, assemble
 from ..mechanics.spots import ending_at, fine_enough, spots_of
 from ..mechanics.unilateral import all_stops, rows_of
 from ..stopping import arrived
+from .approaching import Approaching
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
 from .conserving import Conserving
 from .events import TOGETHER
@@ -174,12 +175,24 @@ class Simulation:
         steps = USUAL_STEPS if before is None else 2 * before
         steps = steps if analysis.step is None else int(analysis.duration / analysis.step)
         unilateral = rows_of(model)
-        system = StageEquations(equations, masses, self.settings.kernels, CALLS * max(steps, 1), unilateral)
+
+        def system_of(equations: Equations) -> StageEquations:
+            rows = rows_of(equations.model)
+            return StageEquations(equations, masses, self.settings.kernels, CALLS * max(steps, 1), rows)
+
+        system = system_of(equations)
         integrator = INTEGRATORS[self.name](system, self.progress)
         self.seconds["model"] += built - begin
         self.seconds["build"] += time.perf_counter() - built
         mover = Mover(equations, Inertia(system), masses.time, system.factors)
-        begun, notes = self.begun(system, mover.acting(np.zeros(len(unilateral))) if len(unilateral) else None)
+        begun, notes = self.begun(system, mover.free if len(unilateral) else None)
+        if any(contact.between_members for contact in self.scene.contacts.values()):
+
+            def with_rows(approaches: tuple[Approach, ...]) -> StageEquations:
+                near = assemble(self.scene, replace(mesh, approaches=approaches), assembly="nodal")
+                return system_of(Equations(near, kernels=self.settings.kernels))
+
+            begun = replace(begun, near=Approaching(mover, with_rows))
         beyond = min((t for t in self._kinks if t >= analysis.duration), default=np.inf)
         watch = None if analysis.until is None else Watch(analysis.until, mover)
         times = self.times if watch is None else finer(self.times)
@@ -214,7 +227,7 @@ class Simulation:
         if not beyond and (watch is None or not watch.ended):
             run.instants += [mover.instant(sample) for sample in integrator.rest()]
         if watch is not None:
-            record = integrator.record if len(unilateral) else None
+            record = integrator.record if self.scene.hits else None
             run.instants = watch.up_to_end(run.instants, self.times, None if record is None else record.sample)
             run.notes = (*run.notes, watch.note(run.instants))
         run.count, run.gap, run.norm, run.record = integrator.count, integrator.gap, integrator.norm, integrator.record

@@ -78,6 +78,11 @@ class Fields:
         nodal, _ = equations.displacements(state, loading, gained)
         self._nodal = nodal.reshape(len(model.segments.places), -1)
 
+    @property
+    def displaced(self) -> Array:
+        """Displacements (places, axes) of the places of the model, dimensionless."""
+        return self._nodal
+
     @functools.cached_property
     def _pull(self) -> Array:
         """Minus the internal force at the points of elements (elements, points, axes), without that of strings.

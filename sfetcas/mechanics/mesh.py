@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from .carried import carried, magnetic, natural_turning
 
 __all__ = [
     "YIELDING",
+    "Approach",
     "ContactPoint",
     "Cushion",
     "Grip",
@@ -246,6 +248,59 @@ class Spot:
 
 
 @dataclass(frozen=True)
+class Approach:
+    """Two members that are near to each other in a motion, where nothing else is nearer.
+
+    Attributes
+    ----------
+    contact : str
+        Name of the record.
+    members : (str, str)
+        The same one twice where it comes near to itself.
+    elements : (int, int)
+        The elements of the members on which these places are, counted from 0; a rigid member is one.
+    at : (float, float)
+        Fractions of the lengths of the members near to which the places are.
+    held : (bool, bool)
+        Whether the place stays at the end of its member; else it is where the distance is least.
+    distance : float
+        What the distance between the centre lines is where the surfaces touch, m.
+    """
+
+    rubs: ClassVar[bool] = False
+
+    contact: str
+    members: tuple[str, str]
+    elements: tuple[int, int]
+    at: tuple[float, float]
+    held: tuple[bool, bool]
+    distance: float
+
+    @property
+    def key(self) -> tuple[str, tuple[object, ...], tuple[object, ...]]:
+        """What tells it from others; where exactly it is changes with the motion."""
+        one, other = (
+            (member, at if held else element, held)
+            for member, element, at, held in zip(self.members, self.elements, self.at, self.held, strict=True)
+        )
+        return self.contact, one, other
+
+    @property
+    def name(self) -> str:
+        """Name of its constraint row."""
+        parts = (
+            f"the {'end' if at else 'begin'} of {member}" if held else f"element {element + 1} of {member}"
+            for member, element, at, held in zip(self.members, self.elements, self.at, self.held, strict=True)
+        )
+        return f"contacts.{self.contact}, {' and '.join(parts)}"
+
+    @property
+    def where(self) -> str:
+        """What it is in the scene: ``members.rod and members.post``."""
+        return " and ".join(f"members.{member}" for member in self.members)
+
+
+@dataclass(frozen=True)
 class Cushion:
     """A penalty contact at a place of a member, used on the way to a state in contact.
 
@@ -316,7 +371,9 @@ class Mesh:
     places : bool
         Whether every end of an element of a flexible member has displacement unknowns, as masses need.
     spots : tuple of Spot, or None
-        Where obstacles stop members in a motion; None where it is no mesh of one with obstacles.
+        Where obstacles stop members in a motion; None where it is no mesh of one with contact.
+    approaches : tuple of Approach
+        Where members are near to each other in a motion.
     memory : mapping of str to Remembered, or None
         What members remember whose laws have memory, nothing before the first step; None where no step is known to
         come after another.
@@ -332,6 +389,7 @@ class Mesh:
     points: tuple[ContactPoint, ...] = ()
     places: bool = False
     spots: tuple[Spot, ...] | None = None
+    approaches: tuple[Approach, ...] = ()
     memory: Mapping[str, Remembered] | None = field(default=None, compare=False, repr=False)
 
     def __repr__(self) -> str:

@@ -24,6 +24,7 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
 from .actuation import actuations_in
 from .beams import ELEMENT_DATA, Beams, Scales, beams_of, scales_of
+from .clearances import clearances_in
 from .connections import connections_in, touches_in
 from .contact_points import contact_points_in
 from .elements import Element, element_by_name
@@ -66,6 +67,7 @@ SOURCES: list[Callable[[Parts], Iterable[One]]] = [
     tubes_in,
     rings_in,
     contact_points_in,
+    clearances_in,
 ]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
 

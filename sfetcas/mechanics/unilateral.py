@@ -15,7 +15,7 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, Index
-from .mesh import Mesh, Spot
+from .mesh import Approach, Mesh, Spot
 from .model import Model
 
 __all__ = ["NONE", "Stops", "Unilateral", "UnilateralRows", "all_stops", "rows_of", "switched_over", "unilaterals"]
@@ -34,14 +34,19 @@ class Unilateral:
         ``tendons``, ``springs`` or ``contacts``, and the name of the record.
     side : str
         ``slack`` of a tendon; ``low`` or ``high`` of a stop; ``touching`` of an obstacle.
-    spot : Spot or None
-        Where an obstacle stops a member in a motion.
+    spot : Spot, Approach or None
+        Where an obstacle stops a member in a motion, or members are near to each other.
     """
 
     table: str
     name: str
     side: str
-    spot: Spot | None = None
+    spot: Spot | Approach | None = None
+
+    @property
+    def where(self) -> str:
+        """Where it stands in the scene."""
+        return f"{self.table}.{self.name}"
 
     @property
     def entry(self) -> tuple[str, str]:
@@ -116,15 +121,17 @@ class UnilateralRows:
     @property
     def names(self) -> list[str]:
         """Where each stands in the scene."""
-        return [f"{part.table}.{part.name}" for part in self.parts]
+        return [part.where for part in self.parts]
 
     def mesh(self, mesh: Mesh, acting: Array) -> Mesh:
         """The mesh of the choice in which those are active whose number in ``acting`` (n,) is not zero."""
         pairs = list(zip(self.parts, (acting != 0.0).tolist(), strict=True))
         stops = tuple(part.entry for part, now in pairs if part.spot is None and now != (part.side == "slack"))
         # Forces along obstacles are loads there.
-        spots = tuple(replace(part.spot, rubs=False) for part, now in pairs if part.spot is not None and now)
-        return replace(mesh, stops=stops, spots=None if mesh.spots is None else spots)
+        now_acting = [part.spot for part, now in pairs if now]
+        spots = tuple(replace(spot, rubs=False) for spot in now_acting if isinstance(spot, Spot))
+        approaches = tuple(spot for spot in now_acting if isinstance(spot, Approach))
+        return replace(mesh, stops=stops, spots=None if mesh.spots is None else spots, approaches=approaches)
 
     def acting(self, stops: Stops) -> Array:
         """The numbers (n,), one of those that are active, of a choice; no obstacle is."""
@@ -143,7 +150,8 @@ def all_stops(scene: Scene) -> Stops:
 def rows_of(model: Model) -> UnilateralRows:
     """The rows of a model in which all unilateral constraints of its scene are active; none where it has none."""
     scene, names = model.scene, model.row_names
-    touching = [Unilateral("contacts", spot.contact, "touching", spot) for spot in model.mesh.spots or ()]
+    spots: tuple[Spot | Approach, ...] = (*(model.mesh.spots or ()), *model.mesh.approaches)
+    touching = [Unilateral("contacts", spot.contact, "touching", spot) for spot in spots]
     parts = (*unilaterals(scene), *touching)
     number = {name: i for i, name in enumerate(names)} if touching else {}
     found, restitution = [], np.zeros(len(parts))

@@ -1,0 +1,264 @@
+"""Members that touch each other in motions: impacts of bars, rest, sliding, against closed forms and obstacles."""
+
+import re
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from sfetcas import Scene, SceneError, SolveError, solve
+from sfetcas.contact.closest import Closest
+from sfetcas.mechanics.clearances import Clearance
+from sfetcas.mechanics.elements import Element
+from sfetcas.mechanics.terms import rotation_gradient, rows_of
+
+RADIUS = 0.01
+MASS = 1200.0 * np.pi * RADIUS**2
+"""Of a bar of the length one."""
+
+INERTIA = MASS / 12.0 + MASS * RADIUS**2 / 4.0
+"""Of it about an axis across it: what is thin has the rotary inertia of its sections as well."""
+
+SECTION = {"shape": "circle", "radius": RADIUS, "E": 2e8, "G": 8e7, "rho": 1200.0}
+
+
+def bars(second, *, speed=1.0, kind="rigid", contact=None, first=((-0.5, 0, 0), (0.5, 0, 0)), **more):
+    """A bar that lies along x in space, free, and a second one that comes down on it."""
+    start = {"velocity": [0.0, 0.0, -speed]} if speed else {}
+    nodes = {f"a{i}": {"position": list(at)} for i, at in enumerate(first)}
+    nodes |= {f"b{i}": {"position": list(at), **start} for i, at in enumerate(second)}
+    members = {name: {"nodes": [f"{name}0", f"{name}1"], "type": kind, "section": "rod"} for name in "ab"}
+    scene = {
+        "dimension": "space",
+        "sections": {"rod": SECTION},
+        "nodes": nodes,
+        "members": members,
+        "contacts": {"pair": {"type": "members", "members": ["a", "b"], **(contact or {})}},
+        "analysis": {"type": "dynamic", "end": 0.2, "step": 5e-3},
+    }
+    for key, value in more.items():
+        scene[key] = {**scene.get(key, {}), **value} if isinstance(value, dict) else value
+    return Scene.from_dict(scene)
+
+
+def across(at, height=0.1, angle=0.5 * np.pi):
+    c, s = 0.5 * np.cos(angle), 0.5 * np.sin(angle)
+    return (at - c, -s, height), (at + c, s, height)
+
+
+def gaps(motion, name="pair"):
+    found = [np.min(step.contacts[name]["gap"]) for step in motion.steps]
+    return np.array(found)
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("restitution", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("angle", [0.5 * np.pi, 0.4])
+def test_bars_collide(restitution, angle):
+    """Two free bars: impulse and energy by the closed form, both momenta kept."""
+    motion = solve(bars(across(0.3, angle=angle), contact={"restitution": restitution}))
+    hit = motion.events[0]
+    yielding = 2.0 / MASS + 0.3**2 / INERTIA
+    # The place is known to 1e-12; everything else is arithmetic.
+    assert hit.time == pytest.approx(0.1 - 2.0 * RADIUS, rel=1e-9)
+    assert hit.impulse == pytest.approx((1.0 + restitution) / yielding, rel=1e-9)
+    assert hit.dissipated == pytest.approx(0.5 * (1.0 - restitution**2) / yielding, rel=1e-9, abs=1e-12)
+    assert hit.where == "members.b and members.a" or hit.where == "members.a and members.b"
+    first, last = motion.steps[0], motion.last
+    # Radau's method keeps linear momentum to rounding and angular momentum as accurately as its steps are.
+    assert last.momentum["linear"] == pytest.approx(first.momentum["linear"], abs=1e-12)
+    assert last.momentum["angular"] == pytest.approx(first.momentum["angular"], abs=1e-8)
+    totals = motion.energies() + np.array([step.energy["dissipated"] for step in motion.steps])
+    assert totals == pytest.approx(totals[0], abs=1e-7)
+    # Bars that stay together press until they have turned far enough; nothing is inside beyond the interpolation.
+    assert gaps(motion).min() > -1e-6 * RADIUS
+
+
+@pytest.mark.fast
+def test_parallel_bars_hit_along_their_length():
+    """Bars that meet in parallel have rows at the ends of both, so that they rebound without turning."""
+    motion = solve(bars(((-0.5, 0, 0.1), (0.5, 0, 0.1)), contact={"restitution": 1.0}))
+    assert motion.last.velocity("b0") == pytest.approx(np.zeros(3), abs=1e-9)
+    assert motion.last.velocity("a1") == pytest.approx([0.0, 0.0, -1.0], abs=1e-9)
+    assert motion.last.energy["dissipated"] == pytest.approx(0.0, abs=1e-12)
+
+
+HELD = {"nodes": {"a0": {"position": [0, -0.5, 0], "support": "clamped"}, "a1": {"position": [0, 0.5, 0]}}}
+
+
+def held(second, obstacle, **more):
+    """What falls on a held bar, or on a cylinder of both radii in its place."""
+    scene = bars(second, speed=0.0, gravity=[0, 0, -10.0]).to_dict()
+    scene["nodes"] |= HELD["nodes"]
+    if obstacle:
+        round_one = {"type": "cylinder", "center": [0, 0, 0], "axis": [0, 1, 0], "radius": 2.0 * RADIUS}
+        scene["contacts"] = {"pair": {**round_one, "member": "b"}}
+    for key, value in more.items():
+        scene[key] = {**scene[key], **value}
+    return Scene.from_dict(scene)
+
+
+@pytest.mark.fast
+def test_an_end_slides_as_on_an_obstacle():
+    """The end of a bar falls on a held bar and slides down on it, as on a cylinder of both radii."""
+    second = ((0.004, 0.0, 0.1), (0.8, 0.3, 0.35))
+    one, other = (solve(held(second, obstacle)) for obstacle in (False, True))
+    assert one.events[0].impulse == pytest.approx(other.events[0].impulse, rel=1e-9)
+    # Both have the same steps and equations, until a place beside the end is nearer, which obstacles do not know.
+    assert one.at(0.16).position("b1") == pytest.approx(other.at(0.16).position("b1"), abs=1e-11)
+    pair, stop = one.at(0.16).contacts["pair"], other.at(0.16).contacts["pair"]
+    assert pair["force"] == pytest.approx(stop["force"], abs=1e-6)
+    assert 0.0 < one.at(0.2).contacts["pair"]["at"] < 0.1
+    assert (pair["member"], pair["at"], pair["other"]) == ("b", 0.0, "a")
+    place = one.at(0.16).position("b0")
+    assert -0.5 + pair["other_at"] == pytest.approx(place[1], abs=1e-9)
+
+
+def test_a_flexible_beam_falls_as_on_an_obstacle():
+    """A flexible beam falls with its middle on a held bar, and hits it again and again as on a cylinder."""
+    beam = {"members": {"a": {"type": "rigid", "nodes": ["a0", "a1"], "section": "rod"}}}
+    beam["members"]["b"] = {"type": "flexible", "nodes": ["b0", "b1"], "section": "rod", "elements": 4}
+    beam["analysis"] = {"type": "dynamic", "end": 0.15, "step": 1e-3}
+    one, other = (solve(held(((-0.4, 0, 0.1), (0.4, 0, 0.1)), obstacle, **beam)) for obstacle in (False, True))
+    assert len(one.events) >= 4
+    for a, b in zip(one.events[:4], other.events[:4], strict=True):
+        assert (a.time, a.impulse, a.acts) == pytest.approx((b.time, b.impulse, b.acts), rel=1e-7)
+    # Each impact multiplies what rounding has left.
+    assert one.at(0.135).position("b0") == pytest.approx(other.at(0.135).position("b0"), abs=1e-10)
+
+
+@pytest.mark.fast
+def test_a_bar_slides_off_the_end():
+    """A bar that lies across another one slides to its end and over it, as a point does on a circle of both radii."""
+    start, speed, around = 0.494, 0.1, 2.0 * RADIUS
+    scene = bars(((start, -0.5, around), (start, 0.5, around)), speed=0.0, gravity=[0, 0, -10.0]).to_dict()
+    scene["nodes"]["a0"]["support"] = "clamped"
+    for name in ("b0", "b1"):
+        scene["nodes"][name]["velocity"] = [speed, 0.0, 0.0]
+    motion = solve(Scene.from_dict(scene))
+    on = motion.at(0.04).contacts["pair"]
+    assert {on["member"]: on["at"], on["other"]: on["other_at"]} == pytest.approx({"a": 0.998, "b": 0.5}, abs=1e-9)
+    assert abs(on["force"][2]) == pytest.approx(10.0 * MASS, rel=1e-6)
+    # It leaves where its weight is just enough for the circle: cos a = (2 + v^2 / g r) / 3.
+    turned = np.arccos((2.0 + speed**2 / (10.0 * around)) / 3.0)
+
+    def leaves(t, x):
+        return x[0] - turned
+
+    leaves.terminal = True
+    found = solve_ivp(
+        lambda t, x: [x[1], 10.0 / around * np.sin(x[0])],
+        (0, 1),
+        [0, speed / around],
+        events=leaves,
+        rtol=1e-11,
+        atol=1e-13,
+    )
+    (left,) = (event for event in motion.events if not event.acts)
+    # The first angle is as accurate as what rounding makes of the place at which the end begins.
+    assert left.time == pytest.approx(0.06 + found.t_events[0][0], abs=1e-6)
+    over = motion.at(0.1).contacts["pair"]
+    assert {over["member"]: over["at"], over["other"]: over["other_at"]} == pytest.approx(
+        {"a": 1.0, "b": 0.5}, abs=1e-9
+    )
+    assert gaps(motion).min() > -1e-6 * RADIUS
+
+
+def test_flexible_bars_keep_momentum():
+    """Flexible bars that collide keep their momentum and lose energy."""
+    motion = solve(bars(across(0.23, angle=1.2), kind="flexible", analysis={"step": 2e-3, "end": 0.15}))
+    assert motion.events
+    first = motion.steps[0].momentum["linear"]
+    assert motion.last.momentum["linear"] == pytest.approx(first, abs=1e-9)
+    totals = motion.energies()
+    assert totals[-1] < totals[0]
+    # Between the ends of steps of this length waves are interpolated.
+    assert gaps(motion).min() > -1e-4 * RADIUS
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("held_ends", [(False, False), (True, False)])
+@pytest.mark.parametrize("rigid", [(True, True), (True, False), (False, False)])
+def test_derivatives_of_the_gap(rigid, held_ends):
+    """First and second derivatives with eliminated places, against differences of the gap."""
+    from sfetcas.mathematics import quaternion
+
+    element, rng = Element(True, 2), np.random.default_rng(4)
+    one, other = (None if part else element for part in rigid)
+    kind = Clearance(True, one, other, *held_ends)
+    turns, places, _, _, _ = kind.sizes
+    q = np.array([[1.0, 0.0, 0.0, 0.0]] * turns) + 0.05 * rng.standard_normal((turns, 4))
+    q, u = q / np.linalg.norm(q, axis=1)[:, None], 0.05 * rng.standard_normal((places, 3))
+    lines = [
+        direction if part is None else np.outer(part.weights, direction).ravel()
+        for part, direction in ((one, np.array([1.0, 0.2, 0.1])), (other, np.array([0.1, 1.0, 0.05])))
+    ]
+    data = np.concatenate([[-0.3, 0.6, 0.3, 0.01], [1.0 if held_ends[0] else 0.5, 0.5], *lines])
+    found = rotation_gradient(kind)(q.T, u.T, data, np.zeros(0), 1.7)
+    gradient, stiffness = np.array(found[3]).ravel(), np.array(found[4])
+
+    def gap(x):
+        spins = x[: 3 * turns].reshape(turns, 3)
+        there = np.array(
+            [quaternion.multiply(quaternion.from_rotation_vector(s), r) for s, r in zip(spins, q, strict=True)]
+        )
+        return float(rows_of(kind)(there.T, (u + x[3 * turns :].reshape(places, 3)).T, data, np.zeros(0)))
+
+    for direction in rng.standard_normal((3, len(gradient))):
+        h = 1e-4
+        low, here, high = (gap(h * k * direction) for k in (-1, 0, 1))
+        # Differences of this step err by its square, and by rounding over its square.
+        assert 1.7 * (high - low) / (2.0 * h) == pytest.approx(gradient @ direction, rel=1e-5, abs=1e-6)
+        assert 1.7 * (high - 2.0 * here + low) / h**2 == pytest.approx(
+            direction @ stiffness @ direction, rel=1e-5, abs=1e-5
+        )
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"contacts": {"pair": {"type": "members", "members": ["a", "b"], "friction": 0.1}}},
+            "found between members in a",
+        ),
+        ({"analysis": {"integrator": "generalised-alpha"}}, "accepted: radau-3, radau-2"),
+        ({"analysis": {"integrator": "idas", "step": None}}, "accepted: radau-3, radau-2"),
+        ({"analysis": {"initial": "equilibrium"}}, "accepted: a motion that begins undeformed"),
+    ],
+)
+def test_what_is_refused(change, message):
+    scene = bars(across(0.3), speed=0.0).to_dict()
+    for key, value in change.items():
+        scene[key] = {**scene[key], **value}
+    scene["analysis"] = {key: value for key, value in scene["analysis"].items() if value is not None}
+    with pytest.raises(SceneError, match=re.escape(message)):
+        solve(Scene.from_dict(scene))
+
+
+@pytest.mark.fast
+def test_members_that_begin_inside_each_other_are_refused():
+    with pytest.raises(
+        (SceneError, SolveError), match=r"penetrate by 0\.005 m at 0\.5 and 0\.8 of their lengths at t = 0"
+    ):
+        solve(bars(across(0.3, height=0.015)))
+
+
+@pytest.mark.fast
+def test_the_tree_finds_the_rows():
+    """Rows are of what is near, not of all pairs: of ten bars above each other nine are near to the next one."""
+    scene = bars(across(0.3), speed=0.0).to_dict()
+    for i in range(10):
+        place = across(0.0, height=0.06 * (i + 1), angle=0.3 * (i + 1))
+        scene["nodes"] |= {f"m{i}{k}": {"position": list(at)} for k, at in enumerate(place)}
+        scene["members"][f"m{i}"] = {"nodes": [f"m{i}0", f"m{i}1"], "type": "rigid", "section": "rod"}
+    scene["contacts"]["pair"]["members"] = [f"m{i}" for i in range(10)]
+    scene["analysis"] = {"type": "dynamic", "end": 1e-3, "step": 1e-3}
+    seen = []
+    found = Closest.found
+    try:
+        Closest.found = lambda self, *given: seen.append(found(self, *given)) or seen[-1]
+        solve(Scene.from_dict(scene))
+    finally:
+        Closest.found = found
+    assert len({near.members for near in seen[0]}) == 9
