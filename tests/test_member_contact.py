@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
+from benchmarks.member_checks import wrong_contacts
 from sfetcas import Scene, SceneError, SolveError, load, solve
 
 RADIUS = 0.01
@@ -235,3 +236,45 @@ def test_heavy_ropes_that_stretch_cross_each_other():
     np.testing.assert_allclose(step.contacts["crossing"]["force"], [0.0, 0.0, 0.18474889], atol=1e-6)
     assert step.along("carrying", [0.5])["position"][0, 2] == pytest.approx(-0.32603391, abs=1e-6)
     assert step.certificate.stable is True
+
+
+def scene_of(nodes, members, *, radius=RADIUS, **others):
+    """Members of a section that has a mass, all of which may touch each other and themselves."""
+    table = {
+        "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8, "rhoA": 1.0}},
+        "nodes": nodes,
+        "members": {name: {"section": "s", **member} for name, member in members.items()},
+        "contacts": {"pair": {"type": "members", "members": "all", "radius": radius}},
+        "analysis": {"accuracy": 1e-5},
+    }
+    return Scene.from_dict(table | others)
+
+
+def clamped(*position):
+    return {"position": list(position), "support": "clamped"}
+
+
+@pytest.mark.parametrize("section", [{"EI3": 1.0}, {"EI3": 1.0, "EA": 50.0}])
+def test_slopes_are_those_of_the_positions(section):
+    """On a coarse mesh the unit tangents are others."""
+    fields = solve(leaves(30.0, accuracy=1e-2, sections={"s": section})).last.fields
+    x, h = np.linspace(0.02, 0.98, 25), 1e-5
+    x = x[np.abs(x[:, None] - fields.model.mesh.cuts["a"]).min(axis=1) > h]
+    change = (fields.positions("a", x + h) - fields.positions("a", x - h)) / (2.0 * h)
+    # Central differences leave the third derivative times the square of 1e-5, rounding 1e-16 over 1e-5.
+    np.testing.assert_allclose(fields.slopes("a", x), change, atol=1e-8)
+    assert np.abs(fields.tangents("a", x) - change).max() > 1e-6
+
+
+def test_a_beam_whose_ends_come_together_touches_itself():
+    """On few elements the nearest places are those of the line that the elements make."""
+    beam = {"nodes": ["a0", "a1"], "shape": {"type": "arc", "angle": -0.6}}
+    loads = {"aside": {"type": "distributed", "member": "a", "value": [0, 1]}}
+    close = {"node": "a1", "displacement": [-0.85, 0], "rotation": 0.0}
+    nodes = {"a0": clamped(0, 0), "a1": clamped(1, 0)}
+    step = solve(scene_of(nodes, {"a": beam}, radius=0.02, loads=loads, motions={"close": close})).last
+    touch = step.contacts["pair"]
+    assert wrong_contacts(step) == []
+    # Both halves are mirror images.
+    assert touch["at"] + touch["other_at"] == pytest.approx(1.0, abs=1e-9)
+    np.testing.assert_allclose(touch["force"] / np.linalg.norm(touch["force"]), [-1, 0, 0], atol=1e-9)

@@ -274,7 +274,7 @@ class Closest:
         """
         (member,), stop = pair.members, pair.stop
         assert stop is not None
-        tangent, bent = fields.tangents(member, x), self._curvature(fields, member, x)
+        tangent, bent = fields.slopes(member, x), self._curvature(fields, member, x)
         out = (fields.positions(member, x) - stop.place) @ stop.across
         normals = stop.normals(out + stop.place, tangent)
         slope = np.einsum("ni,ni->n", normals, tangent)
@@ -452,7 +452,7 @@ class Closest:
         """Slope (2, n) and curvature (2, 2, n) of the distance by both arc lengths, distance (n,), normals (n, 3)."""
         a, b = pair.members
         r = [fields.positions(m, x) for m, x in zip((a, b), at, strict=True)]
-        t = [fields.tangents(m, x) for m, x in zip((a, b), at, strict=True)]
+        t = [fields.slopes(m, x) for m, x in zip((a, b), at, strict=True)]
         k = [self._curvature(fields, m, x) for m, x in zip((a, b), at, strict=True)]
         between = r[0] - r[1]
         apart = np.maximum(np.linalg.norm(between, axis=1), TINY)
@@ -460,8 +460,9 @@ class Closest:
         along = np.stack([np.einsum("ni,ni->n", t[0], n), -np.einsum("ni,ni->n", t[1], n)])
         both = np.einsum("ni,ni->n", t[0], t[1])
         curvature = np.empty((2, 2, len(apart)))
-        curvature[0, 0] = (1.0 - along[0] ** 2) / apart + np.einsum("ni,ni->n", n, k[0])
-        curvature[1, 1] = (1.0 - along[1] ** 2) / apart - np.einsum("ni,ni->n", n, k[1])
+        first, second = (np.einsum("ni,ni->n", one, one) for one in t)
+        curvature[0, 0] = (first - along[0] ** 2) / apart + np.einsum("ni,ni->n", n, k[0])
+        curvature[1, 1] = (second - along[1] ** 2) / apart - np.einsum("ni,ni->n", n, k[1])
         curvature[0, 1] = curvature[1, 0] = (-both - along[0] * along[1]) / apart
         return along, curvature, apart, n
 

@@ -720,6 +720,17 @@ class Fields:
         """Unit tangents (n, 3) of the centre line, fixed axes, at fractions x (n,) of the length."""
         return self._tangents(member, x, rotations_along(self.model, self.state.q, member, x))
 
+    def slopes(self, member: str, x: Array) -> Array:
+        """Derivatives (n, 3) of :meth:`positions` by the undeformed arc length, fixed axes, at fractions x (n,).
+
+        The tangents but for the error of the mesh, times the stretch, and inclined where a member is sheared.
+        """
+        model, at = self.model, self._stations(member, x)
+        part = model.elements_of(member)
+        gained = (self.turned[part] - model.beams.tangent[part]) / model.beams.weight[part][..., None]
+        changed = _three(np.einsum("np,npa->na", at.at_points, gained[at.elements]))
+        return np.asarray(model.scene.center_lines[member].tangents(x) + changed)
+
     def positions(self, member: str, x: Array) -> Array:
         """Positions (n, 3) at fractions of the length, m."""
         model = self.model
