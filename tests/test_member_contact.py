@@ -278,3 +278,48 @@ def test_a_beam_whose_ends_come_together_touches_itself():
     # Both halves are mirror images.
     assert touch["at"] + touch["other_at"] == pytest.approx(1.0, abs=1e-9)
     np.testing.assert_allclose(touch["force"] / np.linalg.norm(touch["force"]), [-1, 0, 0], atol=1e-9)
+
+
+def test_what_slips_off_an_end_comes_to_rest_elsewhere():
+    """No equilibrium is near when the upper rod has slid to the end of its own: it falls to where nothing touches."""
+    nodes = {"a0": clamped(0, 0, 0.03), "a1": {"position": [1, 0, 0.03]}}
+    nodes |= {"b0": clamped(0.8, -0.5, 0), "b1": {"position": [0.8, 0.3, 0]}}
+    members = {"a": {"nodes": ["a0", "a1"]}, "b": {"nodes": ["b0", "b1"]}}
+    tip = {"type": "force", "node": "a1", "value": [0, 0, -8]}
+    scene = scene_of(nodes, members, loads={"tip": tip}, dimension="space")
+    step = solve(scene).last
+    assert any("no equilibrium was near" in note for note in step.notes)
+    assert step.contacts["pair"]["at"] is None
+    alone = solve(scene.replace(contacts={})).last
+    # Twice the accuracy, of the size.
+    np.testing.assert_allclose(step.position("a1"), alone.position("a1"), atol=2e-5)
+
+
+def test_what_nothing_but_contact_holds_up_lies_on_it():
+    """A beam on a vertical guide above a half-ring: it moves without turning until it touches."""
+    nodes = {"m": {"position": [0, 0.55], "support": "slider", "direction": [0, 1]}}
+    nodes |= {"c0": {"position": [-0.5, 0.55]}, "c1": {"position": [0.5, 0.55]}}
+    nodes |= {"b0": clamped(-0.4, 0), "b1": clamped(0.6, 0)}
+    members = {"c": {"nodes": ["c0", "m"]}, "d": {"nodes": ["m", "c1"]}}
+    members |= {"b": {"nodes": ["b0", "b1"], "shape": {"type": "arc", "angle": -2.0}}}
+    loads = {"press": {"type": "force", "node": "m", "value": [0, -2]}}
+    step = solve(scene_of(nodes, members, loads=loads)).last
+    assert wrong_contacts(step) == []
+    force = np.sum(np.reshape(step.contacts["pair"]["force"], (-1, 3)), axis=0)
+    assert force[1] == pytest.approx(2.0, abs=1e-8)
+
+
+def test_straight_ropes_whose_ends_come_nearer_lie_across_each_other():
+    """They move aside by the root of the loads: at a hundredth of these they would have passed each other.
+
+    The upper one then leaves the plane in which the loads are.
+    """
+    nodes = {"a0": clamped(-0.5, 0, 0.021), "a1": clamped(0.5, 0, 0.021)}
+    nodes |= {"b0": clamped(0.1, -0.5, 0), "b1": clamped(0.1, 0.5, 0)}
+    members = {"a": {"nodes": ["a0", "a1"]}, "b": {"nodes": ["b0", "b1"]}}
+    nearer = {"a": {"node": "a1", "displacement": [-0.1, 0, -0.1]}, "b": {"node": "b1", "displacement": [0, -0.05, 0]}}
+    scene = scene_of(nodes, members, motions=nearer, gravity=[0, 0, -10], dimension="space")
+    step = solve(scene).last
+    assert wrong_contacts(step) == []
+    assert step.certificate.stable is True
+    assert np.linalg.norm(step.contacts["pair"]["force"]) > 1.0

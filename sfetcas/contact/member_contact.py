@@ -18,7 +18,7 @@ import numpy as np
 from .. import tolerances
 from ..description.scene import Scene
 from ..errors import SceneError
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, numbers, unit
 from ..mechanics.accuracy import roughness
 from ..mechanics.contact_points import undeformed_vectors
 from ..mechanics.equations import State
@@ -99,7 +99,10 @@ below which it is looked whether it has come to rest.
 """
 
 MOST_FALLS = 12
-"""Unstable states on a way that are left, at most."""
+"""Unstable states on a way that are left, and ends of branches, at most."""
+
+ENDED = "no equilibrium was near beyond it"
+"""What a note says of a place on the way from which nothing led on but a fall."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +151,7 @@ class MemberContact:
         self.leaves = scene.analysis.unstable == "leave"
         self.gripping = Gripping(scene, self.closest)
         self.stride, self.first, self.rough, self.finer = STRIDE, FIRST, ROUGH, 1.0
-        self.jumps: list[float] = []
+        self.jumps: list[tuple[float, str]] = []
         self.redundant: bool | None = None
         self.lines: set[PairKey] = set()
 
@@ -270,12 +273,26 @@ class MemberContact:
         prepared.equations.redundant = self.redundant
         resisting = None
         if since is not None:
-            resisting = Drag(prepared.equations, transferred(since.model, since.state, prepared.model), drag)
+            resisting = self._drag(prepared, since, drag)
         # What is lost may overflow before it is told to be.
         with np.errstate(over="ignore", invalid="ignore"):
             found = prepared.correct(state, loading, iterations=ITERATIONS, most=TURN, contraction=2.0, drag=resisting)
         good = found.converged or found.residual <= tolerances.BALANCED
         return found if good else None
+
+    def _drag(self, prepared: Prepared, since: Solved, size: float) -> Drag:
+        """What resists all rotations, and displacements of nodes that are unknowns."""
+        model, scene, moved = prepared.model, self.scene, list[int]()
+        there = transferred(since.model, since.state, model)
+        number = {name: i for i, name in enumerate(model.positions.unknowns)}
+        y = there.y.copy()
+        for name, node in scene.nodes.items():
+            ways = {f"{name}.{c}": axis for c, axis in zip("xyz"[: model.element.axes], np.eye(3))}
+            ways |= {f"travel of {name}": unit(numbers(node.direction))} if node.slides else {}
+            for label in ways.keys() & number.keys():
+                y[number[label]] = ways[label] @ (since.fields.position(name) - node.position) / model.scales.length
+                moved.append(number[label])
+        return Drag(prepared.equations, replace(there, y=y), size, np.array(moved, np.intp))
 
     def _carried(self, source: Solved, prepared: Prepared) -> State:
         """A state as the start on another mesh or with other points, which begin where they are now."""
@@ -291,7 +308,8 @@ class MemberContact:
         unit, axes = target.scales.length, target.element.axes
         # Those that continue are where the points of the state are now.
         now = zip(self.points(source), before.mesh.points, strict=True)
-        formers = {(p.pair, tuple(round(x, 9) for x in p.at)): former for p, former in now}
+        # Those that have slid beyond an end continue there, see :meth:`_freed`.
+        formers = {(p.pair, tuple(round(min(max(x, 0.0), 1.0), 9) for x in p.at)): former for p, former in now}
         placed = Placed(self.scene, source.fields, target.mesh.points)
         begin = undeformed_vectors(self.scene, target.mesh.points)
         for i, point in enumerate(target.mesh.points):
@@ -344,7 +362,7 @@ class MemberContact:
         """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found."""
         tried: set[object] = set()
         since, solved, several = source, False, False
-        careful = False
+        careful, alone = False, set[object]()
         for _ in range(ROUNDS):
             found = self.solved(mesh, points, source, way, since if drag else None, drag)
             if found is None:
@@ -360,6 +378,12 @@ class MemberContact:
                 several = changes > 1 and not careful
                 if not changes:
                     return found
+                if changes == 1:
+                    # What changes alone for the second time goes round.
+                    key = frozenset((p.pair, tuple(round(x, 9) for x in p.at), p.slides, p.new) for p in points)
+                    if key in alone:
+                        return None
+                    alone.add(key)
             source, solved = found, True
         return None
 
@@ -540,25 +564,12 @@ class MemberContact:
 
     def follow(self, way: Callable[[float], Way], start: Solved) -> Solved | None:
         """The state at the end of a way, ``way(1)``, from its begin; None if it is lost."""
-        self.jumps, falls, mesh = [], 0, replace(start.model.mesh, points=())
-        now, step = _Step(0.0, start), self.first
+        self.jumps, self.falls, mesh = [], 0, replace(start.model.mesh, points=())
+        now, step, left = _Step(0.0, start), self.first, -1.0
         while now.part < 1.0:
             self.reached = now
             part, lines = min(1.0, now.part + step), set(self.lines)
-            self.gripping.since = now.solved.fields
-            points = tuple(map(self.gripping.begun, self.points(now.solved)))
-            there = self.resolved(mesh, points, now.solved, way(part))
-            crossings = [] if there is None else self._crossings(now.solved.fields, there.fields)
-            if crossings:
-                # Members thinner than the step is long touch where they were nearest before.
-                there = self.resolved(mesh, (*points, *map(_begun, crossings)), now.solved, way(part))
-                crossings = [] if there is None else self._crossings(now.solved.fields, there.fields)
-            if there is not None and (
-                crossings
-                or self.turned(now.solved.fields, there.fields) > self.stride
-                or self._crossings(there.fields, now.solved.fields)
-            ):
-                there = None
+            there = self._next(mesh, now.solved, way(part))
             begun = None if there is None else self.gripping.begins(there.model.mesh.points, TOUCHED * self.first)
             if begun is not None:
                 # What begins to touch is where it was then: steps end there.
@@ -573,22 +584,54 @@ class MemberContact:
             if there is None or (falling and step > NARROW):
                 # What was taken for a line on the way to a state that is not taken is none.
                 step, self.lines = 0.5 * (part - now.part), lines
-                if step >= SHORTEST:
-                    continue
-                if there is None:
+                if there is None and step < NARROW and left < now.part:
+                    # Where a branch of equilibria ends what moves on comes to rest on another one.
+                    left, there = now.part, self._fallen_from(mesh, now, part, way(part))
+                    now, step = (now, step) if there is None else (_Step(part, there), self.first)
+                    mesh = mesh if there is None else replace(there.model.mesh, points=())
+                elif there is None and step < SHORTEST:
                     return None
+                continue
             assert there is not None
             if falling:
-                falls += 1
-                rest = self.fallen(mesh, there, way(part)) if falls <= MOST_FALLS else None
+                self.falls += 1
+                rest = self.fallen(mesh, there, way(part)) if self.falls <= MOST_FALLS else None
                 if rest is None:
                     return None
-                self.jumps.append(part)
+                self.jumps.append((part, JUMPED))
                 there = rest
             # As long as turns by a little less than a stride.
             longer = min(2.0, AIM * self.stride / max(turned, 0.1 * self.stride))
             now, step = _Step(part, there), longer * (part - now.part) if not falling else self.first
         return now.solved
+
+    def _next(self, mesh: Mesh, now: Solved, way: Way) -> Solved | None:
+        """The state at the end of a step of a way; None where it is not found, or too far away."""
+        self.gripping.since = now.fields
+        points = tuple(map(self.gripping.begun, self.points(now)))
+        there = self.resolved(mesh, points, now, way)
+        crossings = [] if there is None else self._crossings(now.fields, there.fields)
+        if crossings:
+            # Members thinner than the step is long touch where they were nearest before.
+            there = self.resolved(mesh, (*points, *map(_begun, crossings)), now, way)
+            crossings = [] if there is None else self._crossings(now.fields, there.fields)
+        if there is None or crossings:
+            return None
+        far = self.turned(now.fields, there.fields) > self.stride or self._crossings(there.fields, now.fields)
+        return None if far else there
+
+    def _fallen_from(self, mesh: Mesh, now: _Step, part: float, way: Way) -> Solved | None:
+        """Where a state comes to rest a little further on its way, where none is near to it; None where it does not."""
+        if not (self.leaves and now.solved.model.minimisable) or self.falls == MOST_FALLS:
+            return None
+        rest = self.relaxed(mesh, now.solved, way)
+        rest = None if rest is None else self._refined(rest, way)
+        if rest is None or rest.negative > 0:
+            return None
+        if self.turned(now.solved.fields, rest.fields) > self.stride or self.passed(now.solved.fields, rest.fields):
+            self.falls += 1
+            self.jumps.append((part, ENDED))
+        return rest
 
     def _refined(self, found: Solved, way: Way) -> Solved | None:
         """The state on a mesh that is fine enough for what is decided on the way; None if it is not found there."""
@@ -657,34 +700,32 @@ class MemberContact:
 
     def fallen(self, mesh: Mesh, found: Solved, way: Way) -> Solved | None:
         """Where an unstable state falls to through something viscous; None where it does not come to rest."""
-        # Where points are on members is no part of the nudge: they are where members are nearest.
-        return self.relaxed(mesh, self._nudged(found), way, max(-found.stability.smallest, 0.0), self.points(found))
+        return self.relaxed(mesh, self._nudged(found), way, max(-found.stability.smallest, 0.0))
 
-    def relaxed(
-        self, mesh: Mesh, now: Solved, way: Way, deep: float = 0.0, points: Points | None = None
-    ) -> Solved | None:
+    def relaxed(self, mesh: Mesh, now: Solved, way: Way, deep: float = 0.0) -> Solved | None:
         """Where a state that is none of rest comes to rest in something viscous; None where it does not.
 
         ``deep`` is minus its lowest eigenvalue, if that is below zero: drag beyond it leaves each step one minimum.
-        ``points`` are those to begin with, by default the points of the state.
         """
-        points = self.points(now) if points is None else points
         first, least, largest = DRAGS
-        drag = max(first, BEYOND * deep)
+        drag, failed = max(first, BEYOND * deep), False
         for _ in range(FALLS):
-            there = self.resolved(mesh, points, now, way, drag)
+            there = self.resolved(mesh, self.points(now), now, way, drag)
             turned = np.inf if there is None else self.turned(now.fields, there.fields)
             if there is None or turned > STRIDE or self.passed(now.fields, there.fields):
-                drag *= 4.0
+                drag, failed = 4.0 * drag, True
                 if drag > largest * max(deep, 1.0):
                     return None
                 continue
-            now, points = there, self.points(there)
-            if turned < SLOW:
-                rest = self.resolved(mesh, points, now, way)
+            now = there
+            if turned < SLOW and drag <= first:
+                rest = self.resolved(mesh, self.points(now), now, way)
                 if rest is not None and self._stays(now, rest):
                     return rest
-            drag = max(0.3 * drag, least)
+                if drag <= least:
+                    return None
+            # What has just been too little is so once more.
+            drag, failed = drag if failed else max(0.3 * drag, least), False
         return None
 
     def _stays(self, now: Solved, rest: Solved) -> bool:
@@ -693,14 +734,20 @@ class MemberContact:
 
     @staticmethod
     def _nudged(found: Solved) -> Solved:
-        """An unstable state moved along its unstable mode."""
+        """An unstable state moved along its unstable mode.
+
+        Where points are on members is no part of that: they are where members are nearest.
+        """
         prepared, loading = found.prepared, found.loading
         state = prepared.nudged(found, loading, NUDGE)
+        slides = {f"{p.place(side)}, arc length" for p in found.model.mesh.points for side in range(len(p.members))}
+        still = np.array([name in slides for name in found.model.positions.unknowns], dtype=bool)
+        state = replace(state, y=np.where(still, found.state.y, state.y))
         return replace(found, state=state, point=prepared.equations.at(state, loading))
 
     def notes(self, begin: float, end: float) -> tuple[str, ...]:
         """What is said of the last way, between two factors."""
-        return tuple(f"jumped {near_factor(begin + part * (end - begin))}: {JUMPED}" for part in self.jumps)
+        return tuple(f"jumped {near_factor(begin + part * (end - begin))}: {how}" for part, how in self.jumps)
 
 
 def _beside_ends(one: ContactPoint | Near) -> bool:

@@ -37,6 +37,11 @@ SMALL = 1e-3
 """Share of the loads under which a mechanism falls to where members hold each other, which has no place without loads.
 """
 
+SHARES = (1.0, 1e-2, 1e-4)
+"""Shares of small loads: what is straight between ends that come nearer moves aside by the root of them, and shall not
+yet touch.
+"""
+
 LEFT = "left an equilibrium that is unstable on the fine mesh only"
 """A note."""
 
@@ -82,9 +87,13 @@ class MemberContactSteps:
 
     def _begun(self, pilot: Prepared, factor: float, zero: Solved) -> Solved | None:
         """Where a small share of the loads puts what has no place without loads; None where that is not near."""
-        bent = self.ways.bent(pilot, factor)
-        near = bent is not None and self.run.turned(zero.fields, bent.fields) < NEAR
-        return bent if bent is not None and near and self.run.unstopped(zero, bent) else None
+        for share in SHARES:
+            bent = self.ways.bent(pilot, share * factor)
+            if bent is None:
+                return None
+            if self.run.turned(zero.fields, bent.fields) < NEAR and self.run.unstopped(zero, bent):
+                return bent
+        return None
 
     def _alone(self, pilot: Prepared, factor: float, zero: Solved) -> Equilibrium | None:
         """The answer in which nothing touches, where the growing loads lead there; else None."""

@@ -6,17 +6,18 @@ steps ``(K + s M) dx = -F`` of it need the equations and their derivative only; 
 eigenvalue each is a descent direction, and with ``s = 0``, where no eigenvalue is negative, it is Newton's.
 
 With :class:`Drag` a step minimises the energy plus half of ``drag * M`` times the square of the rotations since the
-state before: the implicit Euler step of an overdamped motion, which obstacles may stop.
+state before: the implicit Euler step of an overdamped motion, which obstacles may stop.  What can move without turning
+needs drag on displacements too.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, Index
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
 from .between_states import turned_between
@@ -90,7 +91,7 @@ def flow(
 
 @dataclass(frozen=True)
 class Drag:
-    """Moments that resist rotations since a state.
+    """Moments that resist rotations since a state, and forces that resist displacements.
 
     Attributes
     ----------
@@ -98,18 +99,24 @@ class Drag:
     since : State
     size : float
         Ratio of the moment on a rotation unknown to its rotation times :attr:`.Equations.mass`, dimensionless.
+    moved : ndarray (k,)
+        Numbers of displacement unknowns that are resisted too: forces of this size over the displacement.
     """
 
     equations: Equations
     since: State
     size: float
+    moved: Index = field(default_factory=lambda: np.zeros(0, np.intp))
 
     def __call__(self, state: State, point: Point) -> Point:
-        """The equations at a state with the moments of drag, their scale and their stiffness added."""
+        """The equations at a state with the drag, its scale and its stiffness added."""
         equations, n = self.equations, self.equations.rotation_unknowns
-        couples = self.size * equations.mass * turned_between(equations, state, self.since)
+        dragged = np.concatenate([np.arange(n), n + self.moved])
+        weight = self.size * np.concatenate([equations.mass, np.ones(len(self.moved))])
+        turned = turned_between(equations, state, self.since)
+        efforts = weight * np.concatenate([turned, (state.y - self.since.y)[self.moved]])
         residual, entries, scale = point.residual.copy(), point.entries.copy(), point.scale.copy()
-        residual[:n] += couples
-        scale[:n] += abs(couples)
-        entries[equations.diagonal[:n]] += self.size * equations.mass
+        residual[dragged] += efforts
+        scale[dragged] += abs(efforts)
+        entries[equations.diagonal[dragged]] += weight
         return replace(point, residual=residual, entries=entries, scale=scale)
