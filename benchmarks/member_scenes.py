@@ -81,16 +81,19 @@ def _bridge(draw: _Draw) -> Table:
     nodes |= {"c0": _node(-0.6, draw.between(-0.2, 0.2), z), "m": _held(0.0, 0.0, z, **guide), "c1": _node(0.6, 0.0, z)}
     members |= {"c": {"nodes": ["c0", "m"]}, "d": {"nodes": ["m", "c1"]}}
     members["d"]["section"] = "of c"
-    load = {"type": "force", "node": "m", "value": [0.0, 0.0, -draw.load(1.0)]}
-    springs: Table = {}
-    if draw.chance(0.7):
-        # Else nothing but the other rods holds it.
+    press, springs = draw.load(1.0), Table()
+    if not draw.chance(0.7):
+        # Nothing but the other rods holds it up: it shall not slide off them aside, nor bend and fall between them.
+        nodes["m"]["rotation"] = "fixed"
+        press = min(press, 5.0)
+    else:
         spring = {"type": "translational", "node": "m", "stiffness": 1.0, "anchor": [0.0, 0.0, 1.0 + z], "length": 1.0}
         springs = {"soft": spring}
         for name, y in (("c0", nodes["c0"]["position"][1]), ("c1", 0.0)):
             x = nodes[name]["position"][0]
             springs[name] = {"type": "translational", "node": name, "stiffness": 1.0, "anchor": [x, y + 1.0, z]}
-    loads, gravity = {"press": load}, [0.0, 0.0, -0.5]
+    loads = {"press": {"type": "force", "node": "m", "value": [0.0, 0.0, -press]}}
+    gravity = [0.0, 0.0, -0.5]
     return draw.table(True, nodes, members, loads=loads, gravity=gravity, springs=springs)
 
 
@@ -119,13 +122,17 @@ def _parallel(draw: _Draw) -> Table:
 
 
 def _loop(draw: _Draw) -> Table:
-    """A beam whose ends are brought together and past each other, or turned, so that it closes to a loop."""
+    """A beam whose ends are brought together, or turned too, so that it closes to a loop.
+
+    Between the ends, which are held, there is room for it to bend: else no force would bring them there.
+    """
     members = {"a": {"nodes": ["a0", "a1"], "shape": {"type": "arc", "angle": -draw.between(0.3, 1.0)}}}
     nodes = {"a0": _held(0.0, 0.0), "a1": _held(1.0, 0.0)}
+    room = round(2.0 * draw.radius + draw.between(0.06, 0.3), 5)
     if draw.chance(0.5):
-        move = {"displacement": [-draw.between(0.8, 1.3), 0.0], "rotation": 0.0}
+        move = {"displacement": [round(room - 1.0, 5), 0.0], "rotation": 0.0}
     else:
-        move = {"displacement": [-draw.between(0.6, 1.0), draw.between(0.0, 0.1)], "rotation": draw.between(3.5, 6.0)}
+        move = {"displacement": [round(room - 1.0, 5), draw.between(0.0, 0.1)], "rotation": draw.between(3.5, 6.0)}
     aside = {"type": "distributed", "member": "a", "value": [0.0, draw.between(0.5, 2.0)]}
     motions = {"close": {"node": "a1", **move}}
     return draw.table(False, nodes, members, loads={"aside": aside}, motions=motions)

@@ -312,7 +312,7 @@ class _Looked:
             value, nothing = self.value(load, there["quaternion"]), np.zeros((1, 3))
             yield (value, nothing, there["position"]) if load.type == "force" else (nothing, value, there["position"])
         for x, force in self.pushed.get(name, ()):
-            if x < 1.0:
+            if 0.0 < x < 1.0:
                 yield force[None], np.zeros((1, 3)), self.step.along(name, [x])["position"]
         places, weights = self.points(name)
         there = self.step.along(name, places)
@@ -374,8 +374,8 @@ class _Looked:
             parts += [
                 (self.weights(member)[i], np.zeros(3), inner["position"][i]) for i, _ in sides if self.hung(member)
             ]
-            # What pushes the second end acts beyond its last section: forces are those before a place.
-            pushed = [force for x, force in self.pushed.get(member, ()) if x == 1.0 and ends[1] == name]
+            # What pushes an end acts beyond its last section.
+            pushed = [force for x, force in self.pushed.get(member, ()) if x in (0.0, 1.0) and ends[int(x)] == name]
             parts += [(force, np.zeros(3), here) for force in pushed]
         if node.support != "free":
             parts.append((*step.reaction(name), here))

@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
 from benchmarks.member_checks import wrong_contacts
+from benchmarks.member_scenes import member_scene
 from sfetcas import Scene, SceneError, SolveError, load, solve
 
 RADIUS = 0.01
@@ -323,3 +324,10 @@ def test_straight_ropes_whose_ends_come_nearer_lie_across_each_other():
     assert wrong_contacts(step) == []
     assert step.certificate.stable is True
     assert np.linalg.norm(step.contacts["pair"]["force"]) > 1.0
+
+
+def test_a_hinge_between_two_members_is_pushed_through_both():
+    """The node is the end of one and the beginning of the other: balance is that of both with half of the push each."""
+    step = solve(Scene.from_dict(member_scene("hinged", 0))).last
+    assert {(m, x) for m, x in zip(step.contacts["c"]["member"], step.contacts["c"]["at"])} == {("a", 1.0), ("b", 0.0)}
+    assert wrong_contacts(step) == []
