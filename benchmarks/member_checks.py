@@ -139,18 +139,13 @@ def _wrong_touch(step: Equilibrium, one: Touch, largest: float, accuracy: float)
         yield f"{label} pull by {force:.1e}"
     if np.linalg.norm(np.cross(one.force, normal)) > 1e-7 * max(largest, 1e-300):
         yield f"{label}: a force that is not along the normal"
-    touching = sum(other.members == one.members for other in _same_pair(step, one))
     for member, x, sign in ((a, s, 1.0), (b, t, -1.0)):
         slope = sign * float(normal @ _tangent(step, member, x))
-        # At an end the other member is beyond it; along a line the places are given, and normal to the second only.
-        bad = slope < -1e-3 if x <= 0.0 else slope > 1e-3 if x >= 1.0 else abs(slope) > (1e-2 if touching > 2 else 1e-4)
+        # At an end the other member is beyond it; along a line the places are ends of elements, and given.
+        given = np.abs(step.model.mesh.cuts[member] - x).min() < 1e-12
+        bad = slope < -1e-3 if x <= 0.0 else slope > 1e-3 if x >= 1.0 else abs(slope) > (1e-2 if given else 1e-4)
         if bad and force > 1e-6 * largest:
             yield f"{label}: normal inclined to {member} by {slope:.1e}"
-
-
-def _same_pair(step: Equilibrium, one: Touch) -> list[Touch]:
-    """The places of the same pair of members."""
-    return [other for other in touches(step) if (other.contact, other.members) == (one.contact, one.members)]
 
 
 def _tangent(step: Equilibrium, member: str, x: float) -> Array:
