@@ -85,6 +85,11 @@ ROUGH, REFINED = 0.05, 8
 unstable on a coarse mesh may be stable; divisions at one state at most.
 """
 
+BETWEEN = 0.1
+"""Share of the sum of the radii by which members penetrate each other between the places of a line, from which on its
+elements are divided on the way: else they pass each other there.
+"""
+
 BESIDE, LOCATED = 2, 8.0
 """Elements on either side of the end of a line that are halved, until what the force there bends in one of them is less
 than so many times the accuracy: an eighth of it is the rotation by a force that is off by half an element.
@@ -461,7 +466,10 @@ class MemberContact:
         """New points where members penetrate each other, the deepest first."""
         found: list[Near] = []
         for key in self.lines:
-            found += self._deepest(fields, self.closest.pairs[key], points)
+            pair = self.closest.pairs[key]
+            # Between members all of it is nearly at a gap of zero: what is in by rounding would come and go.
+            least = self.tolerance if pair.stop is None else 0.0
+            found += [one for one in self._deepest(fields, pair, points) if one.gap < -least]
         ends = {end for point in points if point.line for end in self._ends(point)}
         for one in self.closest.found(fields, 0.0):
             deep = one.gap < -self.tolerance and not self._of_line(one) and not ends.intersection(self._ends(one))
@@ -638,6 +646,11 @@ class MemberContact:
         for _ in range(REFINED):
             rough, model = roughness(found.fields) > self.rough, found.model
             marks = {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
+            between = [self.closest.pairs[key] for key in self.lines if len(key[1]) == 2]
+            for near in self.closest.found(found.fields, 0.0, between):
+                if near.gap < -BETWEEN * near.distance and self._flexible(near.members[0]):
+                    cuts = model.mesh.cuts[near.members[0]]
+                    marks[near.members[0]][np.clip(np.searchsorted(cuts, near.at[0]) - 1, 0, len(cuts) - 2)] = True
             if not any(marked.any() for marked in marks.values()):
                 return found
             mesh = replace(model.mesh.refined(marks, found.fields.kinks), points=())
