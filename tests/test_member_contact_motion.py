@@ -75,6 +75,27 @@ def test_bars_collide(restitution, angle):
 
 
 @pytest.mark.fast
+def test_thin_bars_do_not_pass_each_other_in_a_long_step():
+    """Free bars move evenly, in steps as long as one likes; they are two hundred radii apart and meet at 2 s."""
+    motion = solve(bars(across(0.0, height=2.0 + 2.0 * RADIUS), analysis={"type": "dynamic", "end": 3.0, "step": 0.5}))
+    hit = motion.events[0]
+    assert hit.time == pytest.approx(2.0, abs=1e-6)
+    # Both go on with the mean of their velocities.
+    assert motion.last.velocity("a0")[2] == pytest.approx(-0.5, abs=1e-9)
+
+
+@pytest.mark.fast
+def test_a_thin_bar_that_begins_to_fall_does_not_pass_another_one_in_its_first_step():
+    """From rest nothing says how far a step goes before it is taken: this one is 16 times as long as the fall."""
+    height, table = 0.3, bars(across(0.0, height=0.3 + 2.0 * RADIUS), speed=0.0).to_dict()
+    table["nodes"]["a0"]["support"] = "clamped"
+    table |= {"gravity": [0, 0, -9.81], "analysis": {"type": "dynamic", "end": 1.0, "step": 1.0}}
+    motion = solve(Scene.from_dict(table))
+    assert motion.events[0].time == pytest.approx(np.sqrt(2.0 * height / 9.81), abs=1e-9)
+    np.testing.assert_allclose(motion.last.position("b0")[2], 2.0 * RADIUS, atol=1e-6 * RADIUS)
+
+
+@pytest.mark.fast
 def test_parallel_bars_hit_along_their_length():
     """Bars that meet in parallel have rows at the ends of both, so that they rebound without turning."""
     motion = solve(bars(((-0.5, 0, 0.1), (0.5, 0, 0.1)), contact={"restitution": 1.0}))

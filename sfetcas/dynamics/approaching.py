@@ -19,7 +19,7 @@ import numpy as np
 
 from ..contact.closest import Closest, Near, Pair
 from ..errors import SceneError, SolveError, Status
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.clearances import PARALLEL, Rows
 from ..mechanics.equations import State
 from ..mechanics.fields import Fields
@@ -34,6 +34,9 @@ __all__ = ["Approaching"]
 
 REACH = 4.0
 """Distance of surfaces at which members have a row, over the largest sum of radii."""
+
+STRIDE = 0.25
+"""How far members move in a step, over the reach: two that had no row before it are then apart after it."""
 
 MARGIN, EDGE = 0.02, 1e-7
 """How far places go beyond an element before another one takes over, and beyond the end of a member, fractions of it:
@@ -173,7 +176,14 @@ class Approaching:
     def longest(self, memory: Memory) -> float:
         """The longest step from a state in which nothing can be touched that has no row."""
         speed = float(np.linalg.norm(self._relative(memory.rates[0]), axis=1).max(initial=0.0))
-        return 0.25 * self._reach / self._mover.model.scales.length / max(speed, 1e-300)
+        return STRIDE * self._reach / self._mover.model.scales.length / max(speed, TINY)
+
+    def far(self, taken: Taken) -> bool:
+        """Whether members have moved so far in a step that some without a row may have touched or passed each other."""
+        moved = self._relative(taken.after.position) - self._relative(taken.begin.position)
+        length = float(np.linalg.norm(moved, axis=1).max(initial=0.0)) * self._mover.model.scales.length
+        # A step at constant speed is not refused for rounding.
+        return length > 1.25 * STRIDE * self._reach
 
     def within(self, taken: Taken) -> Passed | None:
         """What happens first in a step; after it the rows may have come to an end."""

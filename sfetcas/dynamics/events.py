@@ -170,6 +170,10 @@ class Events:
         """No step is too long."""
         return np.inf
 
+    def far(self, taken: Taken) -> bool:
+        """No step goes too far."""
+        return False
+
     # -- within a step --------------------------------------------------------------------------------
 
     def within(self, taken: Taken) -> Passed | None:

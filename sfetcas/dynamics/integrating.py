@@ -164,6 +164,9 @@ class Watching(Protocol):
     def longest(self, memory: Memory) -> float:
         """The longest step that may be taken from a state."""
 
+    def far(self, taken: Taken) -> bool:
+        """Whether a step went so far that something may have happened in it unseen: a shorter one is taken instead."""
+
 
 def _arms(group: Observables) -> Array:
     """What the error of quantities counts beside that of positions: the arm on which their share of all mass would be.
@@ -377,7 +380,7 @@ def integrate(
         while end > memory.t:
             going: _Fixed | _Adaptive
             if step is not None:
-                going = _Fixed(stepper, step)
+                going = _Fixed(stepper, step, events)
             else:
                 assert tolerance is not None
                 going = _Adaptive(stepper, tolerance, first, events)
@@ -420,11 +423,21 @@ BEYOND = 3
 """Steps beyond the end at most."""
 
 
-class _Fixed:
-    """Equal steps up to a break, no longer than a given length."""
+def _longest(events: Watching | None, memory: Memory) -> float:
+    """The longest step that may be taken from a state."""
+    return np.inf if events is None else events.longest(memory)
 
-    def __init__(self, stepper: Stepper, step: float) -> None:
-        self._stepper, self.h = stepper, step
+
+def _far(events: Watching | None, taken: Taken) -> bool:
+    """Whether a step went farther than what is watched allows."""
+    return events is not None and events.far(taken)
+
+
+class _Fixed:
+    """Equal steps up to a break, no longer than a given length; divided where one may be too long."""
+
+    def __init__(self, stepper: Stepper, step: float, events: Watching | None) -> None:
+        self._stepper, self.h, self._events = stepper, step, events
 
     def until(self, memory: Memory, end: float) -> Iterator[Taken]:
         """The steps."""
@@ -432,11 +445,17 @@ class _Fixed:
         count = max(1, int(np.ceil(span / self.h - 1e-9)))
         memory = self._stepper.refreshed(memory, span / count)
         for k in range(count):
-            taken = self._stepper.step(memory, (end - memory.t) / (count - k))
-            if not taken.converged:
-                raise _failed(self._stepper, taken)
-            memory = taken.after
-            yield taken
+            left = (end - memory.t) / (count - k)
+            while left > tolerances.DECIMAL * span:
+                h = left / max(1, int(np.ceil(left / _longest(self._events, memory))))
+                taken = self._stepper.step(memory, h)
+                while taken.converged and _far(self._events, taken):
+                    h *= 0.5
+                    taken = self._stepper.step(memory, h)
+                if not taken.converged:
+                    raise _failed(self._stepper, taken)
+                memory, left = taken.after, left - h
+                yield taken
 
 
 class _Adaptive:
@@ -451,29 +470,26 @@ class _Adaptive:
     def until(self, memory: Memory, end: float) -> Iterator[Taken]:
         """The steps."""
         span = end - memory.t
-        h = min(span if self.h is None else self.h, span, self._longest(memory))
+        h = min(span if self.h is None else self.h, span, _longest(self._events, memory))
         least = tolerances.DECIMAL * span
         for taken in self._begun(memory, h, least):
             memory = taken.after
             yield taken
         h = self.h = min(self.h or h, span)
         while end - memory.t > least:
-            left, h = end - memory.t, min(h, self._longest(memory))
+            left, h = end - memory.t, min(h, _longest(self._events, memory))
             # The last steps share what is left evenly.
             h = left if left <= h * 1.0001 else 0.5 * left if left < 2.0 * h else h
             taken = self._stepper.step(memory, h)
             error = self._error(memory, taken)
-            if error > REJECTED:
+            if error > REJECTED or _far(self._events, taken):
                 if h < least:
                     raise _failed(self._stepper, taken)
-                h = self._scaled(h, error, 0.5)
+                h = self._scaled(h, max(error, REJECTED), 0.5)
                 continue
             memory = taken.after
             yield taken
             h = self.h = max(self._scaled(h, error, GROWTH), least)
-
-    def _longest(self, memory: Memory) -> float:
-        return np.inf if self._events is None else self._events.longest(memory)
 
     def _scaled(self, h: float, error: float, most: float) -> float:
         share = 0.25 if not np.isfinite(error) else 0.9 * max(error, 1e-12) ** (-1.0 / self._order)
@@ -496,7 +512,7 @@ class _Adaptive:
             error = np.inf
             if whole.converged and half.converged:
                 other = stepper.step(half.after, 0.5 * h)
-                if other.converged:
+                if other.converged and not (_far(self._events, half) or _far(self._events, other)):
                     missed = (whole.after.position - other.after.position) * stepper.judged
                     error = float(np.abs(missed).max()) / self._tolerance
                     if error <= 1.0:
