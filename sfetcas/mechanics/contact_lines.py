@@ -46,7 +46,6 @@ class Mean(Term):
     rough: bool = False
 
     table: ClassVar[str] = "contacts"
-    answers: ClassVar[dict[str, str]] = {"moved on first": "m", "moved on second": "m"}
     shares_row: ClassVar[bool] = True
 
     @property
@@ -57,10 +56,6 @@ class Mean(Term):
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """The means."""
         return list(u[0][: self.sizes[2]])
-
-    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
-        """It stays where elements end."""
-        return [ca.SX(0), ca.SX(0)]
 
 
 @final

@@ -169,10 +169,11 @@ class Fields:
         size ``push`` N, below zero where it would be a pull.
 
         With friction ``push`` is the size of the part across, ``friction`` (3,) N the part along, ``slip`` (3,) m how
-        far the first one has slipped since the last state of the way, and ``sticks`` whether it sticks.
+        far the first one has slipped since the last state of the way, ``rubs`` N the size that the law of friction is
+        for, and ``sticks`` whether it sticks.
         """
         found, lines = self.balance.answers("contacts", point.name), self.model.scene.center_lines
-        moved = (found["moved on first"], found["moved on second"])
+        moved = (found.get("moved on first", 0.0), found.get("moved on second", 0.0))
         at = tuple(a + s / lines[m].length for a, s, m in zip(point.at, moved, point.members, strict=False))
         slip = np.array([found.get(f"slip {axis}", 0.0) for axis in "xyz"])
         if point.line:
