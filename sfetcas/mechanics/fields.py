@@ -174,7 +174,7 @@ class Fields:
         """
         found, lines = self.balance.answers("contacts", point.name), self.model.scene.center_lines
         moved = (found.get("moved on first", 0.0), found.get("moved on second", 0.0))
-        at = tuple(a + s / lines[m].length for a, s, m in zip(point.at, moved, point.members, strict=False))
+        at = tuple(float(a + s / lines[m].length) for a, s, m in zip(point.at, moved, point.members, strict=False))
         slip = np.array([found.get(f"slip {axis}", 0.0) for axis in "xyz"])
         if point.line:
             shares = self._line_forces(point)
@@ -187,7 +187,7 @@ class Fields:
             # Along a line the friction that the law is for is that along the directions of each place.
             size = float(np.linalg.norm([found[f"friction {axis}"] for axis in "xyz"]))
             limit = point.grip.coefficient * found["push"]
-            answer |= {"friction": friction, "slip": slip, "rubs": size, "sticks": size < limit * (1.0 - SLIDES)}
+            answer |= {"friction": friction, "slip": slip, "rubs": size, "sticks": bool(size < limit * (1.0 - SLIDES))}
         return answer
 
     def _line_forces(self, point: ContactPoint) -> Array:
