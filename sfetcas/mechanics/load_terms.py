@@ -369,7 +369,8 @@ def carried(forces: Array, segments: Segments, element: Element) -> tuple[Array,
 
 def pull_within(forces: Array, element: Element) -> Array:
     """Pull (elements, points, axes) within each element by the forces along it alone, as of :func:`carried`."""
-    return np.asarray(-np.einsum("jk,eja->eka", element.to_points, forces) / element.weights[:, None])
+    pull: Array = -np.einsum("jk,eja->eka", element.to_points, forces) / element.weights[:, None]
+    return pull
 
 
 # -- what they are at a state -----------------------------------------------------------------------
