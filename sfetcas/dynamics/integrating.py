@@ -64,7 +64,7 @@ class Memory:
     rubs : Rubs or None
         What the places that rub on obstacles do; None where there are none.
     unilateral : UnilateralRows
-        The constraints of :attr:`acting`, which change where members come near to each other.
+        The constraints of ``acting``, which change where members come near to each other.
     """
 
     t: float

@@ -60,7 +60,7 @@ class Sample:
     rubs : Rubs or None
         What the places that rub on obstacles do, and the directions of sliding a little earlier.
     unilateral : UnilateralRows
-        The constraints of :attr:`acting`.
+        The constraints of ``acting``.
     """
 
     t: float
