@@ -283,3 +283,13 @@ def test_the_tree_finds_the_rows():
     finally:
         Closest.found = found
     assert len({near.members for near in seen[0]}) == 9
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("kind", ["members", "plane"])
+def test_an_unknown_member_is_named(kind):
+    table = bars(across(0.3)).to_dict()
+    plane = {"point": [0, 0, -1], "normal": [0, 0, 1]} if kind == "plane" else {}
+    table["contacts"] = {"c": {"type": kind, "members": ["a", "zz"], **plane}}
+    with pytest.raises(SceneError, match=r"contacts\.c\.members: found 'zz', accepted: a, b"):
+        Scene.from_dict(table)

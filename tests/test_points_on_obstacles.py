@@ -147,3 +147,23 @@ def test_wrong_input_is_told_in_one_sentence(contact, more, sentence):
     with pytest.raises(SceneError, match=sentence) as told:
         cantilever(contact, **more)
     assert "\n" not in str(told.value)
+
+
+def test_a_rod_that_stretches_rests_in_a_circle_on_its_ends_and_its_middle():
+    """What touches at three places is a line from then on: its pushes go on, though its rows are others."""
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 0.01, "EA": 1000.0}},
+            "nodes": {"a": {"position": [-0.2, -0.8]}, "b": {"position": [0.2, -0.8]}},
+            "members": {"m": {"nodes": ["a", "b"], "section": "s"}},
+            "loads": {"w": {"type": "distributed", "member": "m", "value": [0, -1]}},
+            "contacts": {
+                "bowl": {"type": "circle", "center": [0, 0], "radius": 1.0, "side": "inside", "members": "all"}
+            },
+            "analysis": {"accuracy": 1e-4},
+        }
+    )
+    bowl = solve(scene).last.contacts["bowl"]
+    assert (bowl["at"][0], bowl["at"][-1]) == (0.0, 1.0)
+    # All of the weight.
+    np.testing.assert_allclose(np.sum(bowl["force"], axis=0), [0.0, 0.4, 0.0], atol=1e-9)

@@ -332,8 +332,11 @@ class MemberContact:
                     self._placed(y, numbers, target, source.fields, point, side)
             former = formers.get((point.pair, tuple(round(x, 9) for x in point.at)))
             if former is not None and not point.new:
-                for one, other in zip(former.rows(axes), point.rows(axes), strict=True):
-                    lam[rows[other]] = source.state.lam[known[one]]
+                # Of what has become a line, or ceases to be one, the push alone goes on.
+                same = former.line == point.line
+                for one, other in zip(former.rows(axes)[::-1], point.rows(axes)[::-1], strict=same):
+                    if same or (one.endswith("gap") and other.endswith("gap")):
+                        lam[rows[other]] = source.state.lam[known[one]]
                 if point.grip is not None and former.grip is not None:
                     shares = ("across", "along", "along too")[:axes]
                     force = source.state.y[[had[f"{former.pressed}, {share}"] for share in shares]]

@@ -85,8 +85,10 @@ def check_contact(
             raise SceneError(f"{message} or sphere", (*where, "type"))
         if analysis.integrator in ("idas", "conserving"):
             found = f"found with the integrator {analysis.integrator!r}, which does not find when it is touched"
-            raise SceneError(f"{found}, accepted: radau-3, radau-2, generalised-alpha", where)
-        for member in members_of(contact, members):
+            more = "" if contact.between_members else ", generalised-alpha"
+            raise SceneError(f"{found}, accepted: radau-3, radau-2{more}", where)
+        # Names of nothing are refused elsewhere.
+        for member in (name for name in members_of(contact, members) if name in members):
             section = sections.get(str(members[member].section))
             if members[member].type == "flexible" and section is not None and not section.mass(HEAVY).all():
                 message = f"found the member {member!r}, whose section is without mass, so that it would have to jump"
