@@ -202,16 +202,14 @@ class Closest:
             near += self._minima(fields, pair, at, reach, longest)
         return near
 
-    def gap(self, fields: Fields, pair: Pair) -> float | None:
-        """Smallest distance of the surfaces of a pair, m; None of members that are nowhere near to each other."""
-        if pair.stop is None:
-            return min((one.gap for one in self.found(fields, NEARBY * self.scene.size, [pair])), default=None)
-        ends = self._gaps(fields, pair, np.array([0.0, 1.0]))[0].tolist()
-        return min([*ends, *(one.gap for one in self.found(fields, np.inf, [pair]))])
-
-    def smallest_between(self, fields: Fields, contact: str) -> float | None:
-        """Smallest distance of the surfaces of members in a contact between them, m; None where it is large."""
-        pairs, reach = [pair for pair in self._between if pair.contact == contact], self.largest
+    def gap(self, fields: Fields, contact: str) -> float | None:
+        """Smallest distance of the surfaces of a contact, m; None of members that are nowhere near to each other."""
+        pairs = [pair for pair in self.pairs.values() if pair.contact == contact]
+        if not self.scene.contacts[contact].between_members:
+            ends = [float(self._gaps(fields, pair, np.array([0.0, 1.0]))[0].min()) for pair in pairs]
+            return min([*ends, *(one.gap for one in self.found(fields, np.inf, pairs))], default=None)
+        # Far fewer are near than would be looked at all at once.
+        reach = self.largest
         while reach < 2.0 * NEARBY * self.scene.size:
             if gaps := [near.gap for near in self.found(fields, min(reach, NEARBY * self.scene.size), pairs)]:
                 return min(gaps)
@@ -555,8 +553,7 @@ def answers(fields: Fields) -> dict[str, dict[str, Any]]:
         further = ["other", "other_at"] if contact.between_members else []
         further += ["friction", "sticking"] if contact.friction else []
         if not points:
-            pairs = [pair for pair in closest.pairs.values() if pair.contact == name]
-            gap = min((gap for pair in pairs if (gap := closest.gap(fields, pair)) is not None), default=None)
+            gap = closest.gap(fields, name)
             found[name] = {"force": np.zeros(3), "at": None, "gap": gap, "member": None, **dict.fromkeys(further)}
             found[name] |= {"friction": np.zeros(3)} if contact.friction else {}
             continue

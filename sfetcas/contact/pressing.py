@@ -23,7 +23,7 @@ def pressed(fields: Fields, contacts: Sequence[str]) -> dict[str, dict[str, Any]
     for name in contacts:
         own = [entry for contact, entry in entries if contact == name]
         if not own:
-            gap = closest.smallest_between(fields, name)
+            gap = closest.gap(fields, name)
             nothing = {"force": np.zeros(3), "at": None, "gap": gap, "member": None}
             found[name] = {**nothing, "other": None, "other_at": None}
             continue
