@@ -61,6 +61,9 @@ NEXT_TO = 0.95
 NARROW = 1e-3
 """Share of the length of a member over which minima of its distance from an obstacle are one."""
 
+LYING, SAMPLES = 1e-6, 7
+"""Share of the size of the scene up to which a gap between touches is none, and number of places where it is seen."""
+
 PairKey = tuple[str, tuple[str, ...]]
 """Name of a contact, and the members that touch each other, or the one that touches its obstacle."""
 
@@ -174,10 +177,14 @@ class Closest:
         width = max(radius, NARROW * scene.center_lines[member].length)
         return Pair(name, (member,), radius + stop.sign * stop.radius, width, stop, (first, last))
 
+    def _stiff(self, member: str) -> bool:
+        """Whether a member is straight, and stays so."""
+        return self.scene.members[member].type == "rigid" and self.scene.center_lines[member].turning == 0.0
+
     def samples(self, fields: Fields, member: str) -> Array:
         """Fractions (n,) of the length of a member between which it is nearly straight."""
         cuts = fields.model.mesh.cuts[member]
-        if self.scene.members[member].type == "rigid" and self.scene.center_lines[member].turning == 0.0:
+        if self._stiff(member):
             # What is straight, and stays so, needs no short pieces; between shorter ones fewer may be near.
             return np.linspace(0.0, 1.0, PIECES + 1)
         each = np.diff(cuts) * self.lengths[member] / (SLENDER * self.least[member])
@@ -223,7 +230,9 @@ class Closest:
         found, nodes = list[Near](), set[tuple[str, str]]()
         for pair in pairs:
             (member,) = pair.members
-            places = x[member]
+            # What is straight and rigid is nearest to a plane with an end.
+            ends = pair.stop is not None and pair.stop.kind == "flat" and self._stiff(member)
+            places = x[member][[0, -1]] if ends else x[member]
             gaps = self._gaps(fields, pair, places)[0]
             padded = np.concatenate([[np.inf], gaps, [np.inf]])
             # Of a member that lies along a plane rounding shall not make a minimum of each sample.
@@ -235,9 +244,8 @@ class Closest:
             )
             least &= gaps < reach + self.lengths[member] * np.diff(places).max()
             i = np.flatnonzero(least)
-            at = self._least(
-                fields, pair, places[np.maximum(i - 1, 0)], places[i], places[np.minimum(i + 1, len(places) - 1)]
-            )
+            low, high = places[np.maximum(i - 1, 0)], places[np.minimum(i + 1, len(places) - 1)]
+            at = places[i] if ends else self._least(fields, pair, low, places[i], high)
             gaps, normals, *_ = self._gaps(fields, pair, at)
             for s, gap, normal in zip(at.tolist(), gaps.tolist(), normals, strict=True):
                 if gap >= reach:
@@ -265,6 +273,16 @@ class Closest:
             if moved < ARRIVED:
                 break
         return at
+
+    def lies(self, fields: Fields, pair: PairKey, begin: float, end: float) -> bool:
+        """Whether a member lies on an obstacle between two fractions of its length."""
+        x = np.linspace(begin, end, SAMPLES + 2)[1:-1]
+        return bool(np.abs(self._gaps(fields, self.pairs[pair], x)[0]).max() < LYING * self.scene.size)
+
+    def bends(self, fields: Fields, pair: PairKey, at: float) -> tuple[float, float]:
+        """Slope, and curvature in 1/m, of the gap between a place of a member and an obstacle by arc length."""
+        _, _, slope, curvature = self._gaps(fields, self.pairs[pair], np.array([at]))
+        return float(slope[0]), float(curvature[0])
 
     def _gaps(self, fields: Fields, pair: Pair, x: Array) -> tuple[Array, Array, Array, Array]:
         """Of places (n,) of the member gaps (n,), m, normals (n, 3), and slopes (n,) and curvatures (n,), 1/m, of the
@@ -559,7 +577,7 @@ def answers(fields: Fields) -> dict[str, dict[str, Any]]:
             continue
         entries = [_entry(fields, point) for point in points]
         if not contact.between_members:
-            entries = _stretches(fields, points, entries)
+            entries = _stretches(fields, closest, points, entries)
         found[name] = entries[0] if len(entries) == 1 else {key: [e[key] for e in entries] for key in entries[0]}
     return found
 
@@ -579,25 +597,34 @@ def _entry(fields: Fields, point: ContactPoint) -> dict[str, Any]:
 
 
 def _stretches(
-    fields: Fields, points: Sequence[ContactPoint], entries: Sequence[dict[str, Any]]
+    fields: Fields, closest: Closest, points: Sequence[ContactPoint], entries: Sequence[dict[str, Any]]
 ) -> list[dict[str, Any]]:
-    """Entries of points on an obstacle, those at ends of elements that follow each other as one along a stretch."""
-    found: list[dict[str, Any]] = []
-    last = None
-    for point, entry in zip(points, entries, strict=True):
-        cut = standing(fields.model.mesh, point, 0)
-        if cut is not None and last == (entry["member"], cut - 1):
+    """Entries of points on an obstacle, those between which a member lies on it as one along a stretch."""
+    mesh, found = fields.model.mesh, list[dict[str, Any]]()
+    extents = [_extent(mesh, point, entry) for point, entry in zip(points, entries, strict=True)]
+    for i in sorted(range(len(points)), key=lambda i: (points[i].members, extents[i])):
+        entry, (begin, end) = entries[i], extents[i]
+        if found and found[-1]["member"] == entry["member"]:
             before = found[-1]
-            begin = float(np.atleast_1d(before["at"])[0])
-            gap = max(before["gap"], entry["gap"], key=abs)
-            found[-1] = {**before, "force": before["force"] + entry["force"], "at": [begin, entry["at"]], "gap": gap}
-            if "friction" in entry:
-                found[-1]["friction"] = before["friction"] + entry["friction"]
-                found[-1]["sticking"] = before["sticking"] and entry["sticking"]
-        else:
-            found.append(entry)
-        last = None if cut is None else (entry["member"], cut)
+            first, last = np.broadcast_to(before["at"], 2).tolist()
+            if begin <= last or closest.lies(fields, points[i].pair, last, begin):
+                begin, end = first, max(end, last)
+                gap = max(before["gap"], entry["gap"], key=abs)
+                entry = {**entry, "force": before["force"] + entry["force"], "gap": gap}
+                if "friction" in entry:
+                    entry["friction"] = before["friction"] + entry["friction"]
+                    entry["sticking"] = before["sticking"] and entry["sticking"]
+                found.pop()
+        found.append({**entry, "at": [begin, end] if end > begin else begin})
     return found
+
+
+def _extent(mesh: Mesh, point: ContactPoint, entry: dict[str, Any]) -> tuple[float, float]:
+    """Between which fractions of the length of a member a point pushes."""
+    cut, cuts = standing(mesh, point, 0), mesh.cuts[point.members[0]]
+    if cut is None or not point.line or all(point.sides):
+        return entry["at"], entry["at"]
+    return float(cuts[cut - point.sides[0]]), float(cuts[cut + point.sides[1]])
 
 
 NEARBY = 1.0

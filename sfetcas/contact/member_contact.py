@@ -10,7 +10,8 @@ The loads are followed from zero in steps so short that no member passes through
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+import itertools
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,26 +27,23 @@ from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import ContactPoint, Mesh
 from ..mechanics.model import Model
-from ..mechanics.segments import cuts_of_point, place_of_cut, standing
+from ..mechanics.segments import cuts_of_point, place_of_cut
 from ..solvers.continuation import JUMPED, near_factor
+from ..solvers.newton import Limits, correct
+from ..solvers.one_sided import OneSided
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
-from .closest import Closest, Near, Pair, PairKey
+from .closest import Closest, Near
 from .gripping import FIRM, Gripping, Placed
+from .lines import Lines, Points, begun, points_of
 
 __all__ = ["MemberContact"]
 
-Points = tuple[ContactPoint, ...]
 Way = Callable[[Model], Loading]
 """The loading of a model."""
 
 ROUNDS = 30
 """Changes of the points at one loading, at most."""
-
-LINE, SHORT, ROUND = 3, 4.0, 0.2
-"""Number of points of a pair of members from which on it is taken for a line, parts into which that is divided, and
-angle of something round along which a part is at most, rad.
-"""
 
 SOFTENED, LEAST_SOFTENED = 0.125, 1e-3
 """First and least step of the way on which what is rough ceases to give way, parts of it."""
@@ -90,15 +88,10 @@ BETWEEN = 0.1
 elements are divided on the way: else they pass each other there.
 """
 
-BESIDE, LOCATED = 2, 8.0
-"""Elements on either side of the end of a line that are halved, until what the force there bends in one of them is less
-than so many times the accuracy: an eighth of it is the rotation by a force that is off by half an element.
-"""
-
 NUDGE = 0.02
 """Rotation, rad, by which an unstable state is moved along its unstable mode."""
 
-FALLS, DRAGS, BEYOND, SLOW = 80, (1.0, 1e-6, 1e6), 4.0, 0.1
+FALLS, DRAGS, BEYOND, SLOW = 80, (1.0, 1e-11, 1e6), 4.0, 0.1
 """Steps of a fall at most; first, least and largest drag; drag over what makes a step unique; rotation in a step, rad,
 below which it is looked whether it has come to rest.
 """
@@ -140,10 +133,10 @@ class MemberContact:
         Whether rows of the scene without contact are redundant; None where that is not known.
     gripping : Gripping
         Friction.
-    stride, first, rough, finer : float
-        As ``STRIDE``, ``FIRST`` and ``ROUGH``; share of the parts into which lines are divided that is taken.
-    lines : set
-        Contacts and pairs of members that touch along lines, at nodes of the first one.
+    stride, first, rough : float
+        As ``STRIDE``, ``FIRST`` and ``ROUGH``.
+    lines : Lines
+        The lines along which members touch.
     """
 
     def __init__(
@@ -155,10 +148,10 @@ class MemberContact:
         self.tolerance = min(max(0.1 * accuracy, tolerances.CLOSED) * scene.size, ALLOWED * radii)
         self.leaves = scene.analysis.unstable == "leave"
         self.gripping = Gripping(scene, self.closest)
-        self.stride, self.first, self.rough, self.finer = STRIDE, FIRST, ROUGH, 1.0
+        self.stride, self.first, self.rough = STRIDE, FIRST, ROUGH
         self.jumps: list[tuple[float, str]] = []
         self.redundant: bool | None = None
-        self.lines: set[PairKey] = set()
+        self.lines = Lines(scene, self.closest, fixed)
 
     # -- begin ------------------------------------------------------------------------------------
 
@@ -202,24 +195,26 @@ class MemberContact:
             (member,) = pair.members
             cuts = mesh.cuts[member]
             # What is rigid touches with its ends, or where it is curved.
-            along = self.closest.beside(fields, pair, cuts if self._flexible(member) else cuts[[0, -1]], close)
-            if len(along) >= LINE and self._flexible(member):
-                self.lines.add(pair.key)
-                mesh = self._divided(mesh, pair, [near.at[0] for near in along])
+            along = self.closest.beside(fields, pair, cuts if self.lines.bends(member) else cuts[[0, -1]], close)
+            lies = any(self.closest.lies(fields, pair.key, a, b) for a, b in itertools.pairwise(cuts.tolist()))
+            if along and lies and self.lines.bends(member):
+                self.lines.keys |= {pair.key}
+                mesh = self.lines.divided(mesh, pair, [near.at[0] for near in along])
                 along = self.closest.along(fields, pair, mesh, close)
                 # The line has what it ends at, not the member beside it.
                 found = {key: near for key, near in found.items() if near.pair != pair.key}
                 ends = {end for near in along for end in self._ends(near)}
                 found = {key: near for key, near in found.items() if not ends.intersection(self._ends(near))}
-            elif self._flexible(member):
+            elif self.lines.bends(member):
                 continue
             known = {end for near in found.values() for end in self._ends(near)}
             found |= {(near.pair, near.at): near for near in along if not known.intersection(self._ends(near))}
         if not found:
             return start
-        begun = [_begun(near) for near in found.values()]
-        points = tuple(replace(point, number=i, line=self._lies(mesh, point)) for i, point in enumerate(begun))
-        prepared = self.prepare(replace(mesh, points=points))
+        points = list[ContactPoint]()
+        for near in found.values():
+            points += self.lines.laid([near]) if self.lines.has(near) else [begun(near)]
+        prepared = self.prepare(replace(mesh, points=tuple(self.lines.set_out(mesh, points))))
         nothing = prepared.model.loading(0.0, 0.0)
         state = self._carried(start, prepared)
         return Solved(prepared, state, nothing, prepared.equations.at(state, nothing), 0.0)
@@ -228,10 +223,6 @@ class MemberContact:
         """The contact and the node, where a member touches an obstacle at its end."""
         member, at = near.members[0], near.at[0]
         return [(near.contact, self.scene.members[member].nodes[int(at)])] if at in (0.0, 1.0) else []
-
-    def _flexible(self, member: str) -> bool:
-        """Whether elements of a member may be divided where it touches."""
-        return self.scene.members[member].type != "rigid" and member not in self.fixed
 
     # -- one loading ------------------------------------------------------------------------------
 
@@ -242,7 +233,9 @@ class MemberContact:
 
         With ``drag`` rotations since another state are resisted, see :class:`~sfetcas.solvers.pseudo_transient.Drag`.
         """
-        numbered = [replace(point, number=i, line=self._lies(mesh, point)) for i, point in enumerate(points)]
+        numbered = self.lines.set_out(mesh, points)
+        if self.lines.keys and not (self.scene.rubs or self.redundant):
+            numbered, source = self._pressing(mesh, numbered, source, way, since, drag)
         for _ in FIRM if self.scene.rubs and points else (1.0,):
             set_up = self.gripping.set_up(source.fields, mesh, numbered)
             found = self._corrected(replace(mesh, points=set_up), source, way, since, drag)
@@ -250,6 +243,36 @@ class MemberContact:
                 return found
             self.gripping.change()
         return self._softly(mesh, numbered, source, way, since, drag) if self.scene.rubs and points else None
+
+    def _pressing(
+        self, mesh: Mesh, points: list[ContactPoint], source: Solved, way: Way, since: Solved | None, drag: float
+    ) -> tuple[list[ContactPoint], Solved]:
+        """Those of given points, and of those beside them on lines, that push, and where; as given if none is found."""
+        every = self.lines.set_out(mesh, [*points, *self.lines.beside(mesh, points, source.fields)])
+        free = [i for i, point in enumerate(every) if len(point.members) == 1 and not any(point.slides)]
+        if not free:
+            return points, source
+        for i in free:
+            every[i] = self._known(every[i])
+        prepared = self.prepare(replace(mesh, points=tuple(every)))
+        prepared.equations.redundant = False
+        rows = {name: i for i, name in enumerate(prepared.model.row_names)}
+        pushing = np.array([rows[every[i].rows(prepared.model.element.axes)[-1]] for i in free])
+        acting = np.array([i < len(points) for i in free])
+        resisting = None if since is None else self._drag(prepared, since, drag)
+        loads, state = way(prepared.model), self._carried(source, prepared)
+        system = OneSided(prepared.equations, loads, prepared.weight, None, None, resisting, pushing, acting)
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = correct(system, state, limits=Limits(iterations=ITERATIONS, most=TURN, contraction=2.0))
+        if not found.converged:
+            return points, source
+        idle = {i for i, acts in zip(free, system.acting.tolist(), strict=True) if not acts}
+        kept = [point for i, point in enumerate(every) if i not in idle]
+        return self.lines.set_out(mesh, kept), Solved(prepared, **found._asdict())
+
+    def _known(self, point: ContactPoint) -> ContactPoint:
+        """A point that stays where it is, the gap of which is measured where it is now."""
+        return replace(point, normal=self.closest.pairs[point.pair].normal, new=False)
 
     def _softly(
         self, mesh: Mesh, points: list[ContactPoint], source: Solved, way: Way, since: Solved | None, drag: float
@@ -312,9 +335,9 @@ class MemberContact:
         rows = {name: i for i, name in reversed(list(enumerate(target.row_names)))}
         unit, axes = target.scales.length, target.element.axes
         # Those that continue are where the points of the state are now.
-        now = zip(self.points(source), before.mesh.points, strict=True)
+        now = zip(points_of(source), before.mesh.points, strict=True)
         # Those that have slid beyond an end continue there, see :meth:`_freed`.
-        formers = {(p.pair, tuple(round(min(max(x, 0.0), 1.0), 9) for x in p.at)): former for p, former in now}
+        formers = {replace(p, line=former.line).key: former for p, former in now}
         placed = Placed(self.scene, source.fields, target.mesh.points)
         begin = undeformed_vectors(self.scene, target.mesh.points)
         for i, point in enumerate(target.mesh.points):
@@ -330,7 +353,7 @@ class MemberContact:
                     y[numbers[f"{point.place(side)}, arc length"]] = 0.0
                 else:
                     self._placed(y, numbers, target, source.fields, point, side)
-            former = formers.get((point.pair, tuple(round(x, 9) for x in point.at)))
+            former = formers.get(point.key)
             if former is not None and not point.new:
                 # Of what has become a line, or ceases to be one, the push alone goes on.
                 same = former.line == point.line
@@ -378,7 +401,7 @@ class MemberContact:
                     return None
                 # All at once is faster; where that leads nowhere, one after the other.
                 careful, found = True, source
-            lined = None if careful else self._with_lines(found)
+            lined = None if careful else self.lines.lengthened(found)
             if lined is not None:
                 (mesh, points), several = lined, False
             else:
@@ -388,7 +411,7 @@ class MemberContact:
                     return found
                 if changes == 1:
                     # What changes alone for the second time goes round.
-                    key = frozenset((p.pair, tuple(round(x, 9) for x in p.at), p.slides, p.new) for p in points)
+                    key = frozenset((p.key, p.slides, p.new) for p in points)
                     if key in alone:
                         return None
                     alone.add(key)
@@ -404,7 +427,7 @@ class MemberContact:
         wrong = self._wrong(found, now, pushes)
         more = self._penetrating(fields, [point for point, off in zip(now, wrong, strict=True) if not off])
         states = ["wrong" if off else "right" for off in wrong] + ["new"] * len(more)
-        key = frozenset((p.pair, round(p.at[0], 9), now) for p, now in zip((*now, *more), states, strict=True))
+        key = frozenset((p.key, now) for p, now in zip((*now, *more), states, strict=True))
         if (careful or key in tried) and (wrong.any() or more):
             # Also where all at once goes round.
             worst = int(np.argmin(np.where(wrong, pushes, np.inf))) if wrong.any() else -1
@@ -426,7 +449,9 @@ class MemberContact:
         rounding = LASTING * np.abs(pushes).max(initial=0.0)
         # Along a line what does not push is left; what slides there may have to stay until it is known.
         wrong = lost | (pushes < -rounding - 1e-12 * found.model.scales.force)
-        wrong |= np.array([self._of_line(point) for point in now], dtype=bool) & (pushes < rounding)
+        wrong |= np.array([self.lines.has(p) and not self.lines.chosen(p.pair) for p in now], dtype=bool) & (
+            pushes < rounding
+        )
         # What is new sticks, and may pull only because it does.
         return wrong & np.array([not (point.new and point.grip) for point in found.model.mesh.points], dtype=bool)
 
@@ -442,7 +467,7 @@ class MemberContact:
         kept: list[ContactPoint] = []
         for i in np.argsort(-pushes, kind="stable").tolist():
             point = points[i]
-            if self._of_line(point) or not any(self._same(point, other) for other in kept):
+            if self.lines.has(point) or not any(self._same(point, other) for other in kept):
                 kept.append(point)
         return [point for point in points if point in kept]
 
@@ -461,84 +486,20 @@ class MemberContact:
             slopes = self.closest.slopes(fields, point.pair, at)
             # At an end a point goes inwards where that is nearer; what lies there stays.
             free = [0.0 < x < 1.0 or (0.5 - x) * slope < -LIES for x, slope in zip(at, slopes.tolist(), strict=True)]
-        slides = (free[0] and not self._of_line(point), *free[1:])
+        slides = (free[0] and not self.lines.has(point), *free[1:])
         same = not point.new and slides == point.slides
         return point if same else replace(point, slides=slides, normal=normal, new=False)
 
     def _penetrating(self, fields: Fields, points: list[ContactPoint]) -> Points:
         """New points where members penetrate each other, the deepest first."""
-        found: list[Near] = []
-        for key in self.lines:
-            pair = self.closest.pairs[key]
-            # Between members all of it is nearly at a gap of zero: what is in by rounding would come and go.
-            least = self.tolerance if pair.stop is None else 0.0
-            found += [one for one in self._deepest(fields, pair, points) if one.gap < -least]
+        found = self.lines.deepest(fields, points, self.tolerance)
         ends = {end for point in points if point.line for end in self._ends(point)}
         for one in self.closest.found(fields, 0.0):
-            deep = one.gap < -self.tolerance and not self._of_line(one) and not ends.intersection(self._ends(one))
-            if deep and not any(self._same(one, point) for point in points if not self._of_line(point)):
+            deep = one.gap < -self.tolerance and not self.lines.has(one) and not ends.intersection(self._ends(one))
+            if deep and not any(self._same(one, point) for point in points if not self.lines.has(point)):
                 found.append(one)
-        return tuple(_begun(one) for one in sorted(found, key=lambda one: one.gap))
-
-    def _of_line(self, one: ContactPoint | Near) -> bool:
-        """Whether a place is one of those along a line: not where the second member ends, which slides on the first."""
-        return one.pair in self.lines and _beside_ends(one)
-
-    def _lies(self, mesh: Mesh, one: ContactPoint) -> bool:
-        """Whether a point stands for what presses along a line on an obstacle."""
-        on_line = len(one.members) == 1 and self._of_line(one) and self._flexible(one.members[0])
-        return on_line and standing(mesh, one, 0) is not None
-
-    def _deepest(self, fields: Fields, pair: Pair, points: list[ContactPoint]) -> list[Near]:
-        """Of ends of elements that penetrate those that do so more than the ones beside them: one by one of a line."""
-        cuts = fields.model.mesh.cuts[pair.members[0]]
-        known = {p.at[0] for p in points if p.pair == pair.key}
-        near = {
-            one.at[0]: one for one in self.closest.along(fields, pair, fields.model.mesh, 0.0) if one.at[0] not in known
-        }
-        gaps = np.array([near[x].gap if x in near else 0.0 for x in cuts.tolist()])
-        padded = np.concatenate([[0.0], gaps, [0.0]])
-        deep = (gaps <= padded[:-2]) & (gaps <= padded[2:]) & (gaps < -tolerances.DECIMAL * pair.width)
-        return [near[x] for x in cuts[deep].tolist()]
-
-    def _with_lines(self, found: Solved) -> tuple[Mesh, Points] | None:
-        """Mesh and points where a pair that touches at many places is taken for a line from now on; None for none."""
-        points, mesh = self.points(found), replace(found.model.mesh, points=())
-        for key, pair in self.closest.pairs.items():
-            first = pair.members[0]
-            own = [p for p in points if p.pair == key and _beside_ends(p)]
-            if not self._flexible(first):
-                continue
-            if len(own) < LINE if key not in self.lines else not any(point.slides[0] for point in own):
-                continue
-            self.lines.add(key)
-            places = [point.at[0] for point in own]
-            longest = self._longest(pair, places)
-            low, high = min(places) - longest, max(places) + longest
-            mesh = self._divided(mesh, pair, places)
-            near = self.closest.along(found.fields, pair, mesh, 0.1 * pair.width)
-            inside = [one for one in near if low <= one.at[0] <= high]
-            others = tuple(point for point in points if point not in own)
-            return mesh, (*others, *map(_begun, inside))
-        return None
-
-    def _longest(self, pair: Pair, places: Sequence[float]) -> float:
-        """Longest part of the first member of a pair between places of a line, a fraction of its length."""
-        length = self.closest.lengths[pair.members[0]]
-        turn = np.inf if pair.stop is None or not pair.stop.radius else ROUND * pair.stop.radius / length
-        return float(min(max((max(places) - min(places)) / SHORT, 0.5 * pair.width / length), turn)) * self.finer
-
-    def _divided(self, mesh: Mesh, pair: Pair, places: Sequence[float]) -> Mesh:
-        """A mesh with elements of the first member that are not too long near the places of a line."""
-        first, longest = pair.members[0], self._longest(pair, places)
-        low, high = min(places) - longest, max(places) + longest
-        while True:
-            cuts = mesh.cuts[first]
-            long = (np.diff(cuts) > longest) & (cuts[1:] > low) & (cuts[:-1] < high)
-            if not long.any():
-                return mesh
-            marks = {name: np.zeros(len(c) - 1, bool) for name, c in mesh.cuts.items()}
-            mesh = mesh.refined(marks | {first: long})
+        found.sort(key=lambda one: one.gap)
+        return tuple(p for one in found for p in (self.lines.laid([one]) if self.lines.has(one) else [begun(one)]))
 
     # -- steps ------------------------------------------------------------------------------------
 
@@ -579,14 +540,14 @@ class MemberContact:
         now, step, left = _Step(0.0, start), self.first, -1.0
         while now.part < 1.0:
             self.reached = now
-            part, lines = min(1.0, now.part + step), set(self.lines)
+            part, lines = min(1.0, now.part + step), self.lines.keys
             there = self._next(mesh, now.solved, way(part))
             begun = None if there is None else self.gripping.begins(there.model.mesh.points, TOUCHED * self.first)
             if begun is not None:
                 # What begins to touch is where it was then: steps end there.
                 step = begun * (part - now.part)
                 if step >= SHORTEST:
-                    self.lines = lines
+                    self.lines.keys = lines
                     continue
             there = None if there is None else self._refined(there, way(part))
             mesh = mesh if there is None else replace(there.model.mesh, points=())
@@ -594,7 +555,7 @@ class MemberContact:
             falling = there is not None and self.unstable(there)
             if there is None or (falling and step > NARROW):
                 # What was taken for a line on the way to a state that is not taken is none.
-                step, self.lines = 0.5 * (part - now.part), lines
+                step, self.lines.keys = 0.5 * (part - now.part), lines
                 if there is None and step < NARROW and left < now.part:
                     # Where a branch of equilibria ends what moves on comes to rest on another one.
                     left, there = now.part, self._fallen_from(mesh, now, part, way(part))
@@ -619,12 +580,12 @@ class MemberContact:
     def _next(self, mesh: Mesh, now: Solved, way: Way) -> Solved | None:
         """The state at the end of a step of a way; None where it is not found, or too far away."""
         self.gripping.since = now.fields
-        points = tuple(map(self.gripping.begun, self.points(now)))
+        points = tuple(map(self.gripping.begun, points_of(now)))
         there = self.resolved(mesh, points, now, way)
         crossings = [] if there is None else self._crossings(now.fields, there.fields)
         if crossings:
             # Members thinner than the step is long touch where they were nearest before.
-            there = self.resolved(mesh, (*points, *map(_begun, crossings)), now, way)
+            there = self.resolved(mesh, (*points, *map(begun, crossings)), now, way)
             crossings = [] if there is None else self._crossings(now.fields, there.fields)
         if there is None or crossings:
             return None
@@ -649,70 +610,33 @@ class MemberContact:
         for _ in range(REFINED):
             rough, model = roughness(found.fields) > self.rough, found.model
             marks = {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
-            between = [self.closest.pairs[key] for key in self.lines if len(key[1]) == 2]
+            between = [self.closest.pairs[key] for key in sorted(self.lines.keys) if len(key[1]) == 2]
             for near in self.closest.found(found.fields, 0.0, between):
-                if near.gap < -BETWEEN * near.distance and self._flexible(near.members[0]):
+                if near.gap < -BETWEEN * near.distance and near.members[0] not in self.fixed:
                     cuts = model.mesh.cuts[near.members[0]]
                     marks[near.members[0]][np.clip(np.searchsorted(cuts, near.at[0]) - 1, 0, len(cuts) - 2)] = True
             if not any(marked.any() for marked in marks.values()):
                 return found
             mesh = replace(model.mesh.refined(marks, found.fields.kinks), points=())
-            finer = self.resolved(mesh, self.points(found), found, way)
+            finer = self.resolved(mesh, points_of(found), found, way)
             if finer is None or self.turned(found.fields, finer.fields) > STRIDE:
                 return None
             found = finer
         return found
 
-    def rough_ends(self, found: Solved, accuracy: float) -> dict[str, Array]:
-        """Marks of the elements, by member, in which lines end and where that is therefore not known well enough.
-
-        There a force presses at a point, and where in the element is open: what that bends is an error of rotations.
-        """
-        fields, mesh = found.fields, found.model.mesh
-        marks = {name: np.zeros(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
-        pushes = {(p.pair, p.at[0]): fields.contact_point(p)["push"] for p in mesh.points}
-        scales = found.model.scales
-        for key, stretches in self._stretches(found).items():
-            first = key[1][0]
-            lengths = np.diff(mesh.cuts[first]) * self.closest.lengths[first] / scales.length
-            for stretch in stretches:
-                for at, inner in ((stretch[0], stretch[1:2]), (stretch[-1], stretch[-2:-1])):
-                    if not 0.0 < at < 1.0:
-                        continue
-                    force = sum(pushes.get((key, x), 0.0) for x in {at, *inner}) / scales.force
-                    cut = mesh.cut_at(first, at)
-                    near = slice(max(cut - BESIDE, 0), cut + BESIDE)
-                    bends = force * lengths[near] ** 2 / fields.stiffness(first, at)
-                    marks[first][near] |= bends > LOCATED * accuracy
-        return marks
-
-    def _stretches(self, found: Solved) -> dict[PairKey, list[list[float]]]:
-        """Of each line the ends of elements that touch, those together that follow each other: fractions, rising."""
-        stretches: dict[PairKey, list[list[float]]] = {}
-        for key in (key for key in self.lines if self._flexible(key[1][0])):
-            cuts, last = found.model.mesh.cuts[key[1][0]], -2
-            for at in sorted(point.at[0] for point in self.points(found) if point.pair == key and self._of_line(point)):
-                number = int(np.argmin(np.abs(cuts - at)))
-                if number != last + 1:
-                    stretches.setdefault(key, []).append([])
-                stretches[key][-1].append(at)
-                last = number
-        return stretches
-
-    def points_on(self, mesh: Mesh, found: Solved) -> Points:
-        """The points of a state on a finer mesh, with those of lines at new ends of elements between old ones."""
-        points = self.points(found)
-        for key, stretches in self._stretches(found).items():
-            known = {at for stretch in stretches for at in stretch}
-            near = self.closest.along(found.fields, self.closest.pairs[key], mesh, np.inf)
-            inside = [one for one in near if any(s[0] < one.at[0] < s[-1] for s in stretches)]
-            points = (*points, *(_begun(one) for one in inside if one.at[0] not in known))
-        return points
-
-    @staticmethod
-    def points(found: Solved) -> Points:
-        """The points of a state, where they are now."""
-        return tuple(replace(point, at=found.fields.contact_point(point)["at"]) for point in found.model.mesh.points)
+    def as_points(self, found: Solved, way: Way) -> Solved | None:
+        """The state with lines on obstacles that are shorter than elements as points; None where they are lines."""
+        short, near = self.lines.shortened(found)
+        if not short:
+            return None
+        points = [point for point in points_of(found) if point.pair not in short]
+        points += [self._freed(found.fields, begun(one)) for one in near]
+        lines, self.lines.keys = self.lines.keys, self.lines.keys - short
+        there = self.resolved(replace(found.model.mesh, points=()), tuple(points), found, way)
+        if there is None or short & self.lines.keys or self.turned(found.fields, there.fields) > STRIDE:
+            self.lines.keys = lines
+            return None
+        return there
 
     def fallen(self, mesh: Mesh, found: Solved, way: Way) -> Solved | None:
         """Where an unstable state falls to through something viscous; None where it does not come to rest."""
@@ -726,7 +650,7 @@ class MemberContact:
         first, least, largest = DRAGS
         drag, failed = max(first, BEYOND * deep), False
         for _ in range(FALLS):
-            there = self.resolved(mesh, self.points(now), now, way, drag)
+            there = self.resolved(mesh, points_of(now), now, way, drag)
             turned = np.inf if there is None else self.turned(now.fields, there.fields)
             if there is None or turned > STRIDE or self.passed(now.fields, there.fields):
                 drag, failed = 4.0 * drag, True
@@ -735,7 +659,7 @@ class MemberContact:
                 continue
             now = there
             if turned < SLOW and drag <= first:
-                rest = self.resolved(mesh, self.points(now), now, way)
+                rest = self.resolved(mesh, points_of(now), now, way)
                 if rest is not None and self._stays(now, rest):
                     return rest
                 if drag <= least:
@@ -764,15 +688,3 @@ class MemberContact:
     def notes(self, begin: float, end: float) -> tuple[str, ...]:
         """What is said of the last way, between two factors."""
         return tuple(f"jumped {near_factor(begin + part * (end - begin))}: {how}" for part, how in self.jumps)
-
-
-def _beside_ends(one: ContactPoint | Near) -> bool:
-    """Whether a place is not where the second member ends."""
-    return all(0.0 < x < 1.0 for x in one.at[1:])
-
-
-def _begun(near: Near) -> ContactPoint:
-    """A point that begins where surfaces are nearest to each other."""
-    x, y, z = near.normal.tolist()
-    still = (False,) * len(near.at)
-    return ContactPoint(near.contact, near.members, near.at, still, near.distance, normal=(x, y, z), new=True)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..contact.contact_statics import refuse_held_inside
+from ..contact.lines import Points
 from ..contact.member_contact import MemberContact
 from ..description.inserting import stops_between
 from ..errors import LIMITS, SolveError, Status
@@ -40,6 +41,10 @@ SMALL = 1e-3
 SHARES = (1.0, 1e-2, 1e-4)
 """Shares of small loads: what is straight between ends that come nearer moves aside by the root of them, and shall not
 yet touch.
+"""
+
+ENDS = 8
+"""Times that ends of lines are located on one mesh: each time their error falls by a share of itself, or to its square.
 """
 
 LEFT = "left an equilibrium that is unstable on the fine mesh only"
@@ -149,16 +154,20 @@ class MemberContactSteps:
         if now.model.mesh.order != target.order or self.meshes.fixed:
             mesh = target if self.meshes.fixed else replace(now.model.mesh, order=target.order)
             now = self._onto(mesh, now, factor)
-        smooth, error = np.sqrt(accuracy), np.inf
+        smooth, error, lined = np.sqrt(accuracy), np.inf, 0
         for _ in range(LEVELS):
+            if now.model.mesh.elements > lined:
+                pointed, lined = self.run.as_points(now, lambda model: model.loading(factor)), now.model.mesh.elements
+                now = pointed or now
             rough, model = roughness(now.fields) > smooth, now.model
-            ends = self.run.rough_ends(now, accuracy)
+            ends = self.run.lines.rough_ends(now, accuracy)
             marks = {n: (rough[model.elements_of(n)] | ends[n]) & (n not in self.meshes.fixed) for n in model.members}
             if any(marked.any() for marked in marks.values()):
                 if model.mesh.elements > MOST_ELEMENTS:
                     break
                 now = self._onto(model.mesh.refined(marks, now.fields.kinks), now, factor)
                 continue
+            now = self._with_ends(now, factor)
             finer = self._onto(now.model.mesh.refined(None, now.fields.kinks), now, factor)
             difference, error = self.meshes.judged(unjudged(now), unjudged(finer))
             if self.meshes.prescribed:
@@ -168,6 +177,7 @@ class MemberContactSteps:
             # What members penetrate each other by is an error of positions too.
             error = max(error, self.run.penetration(now.fields) / self.scene.size)
             if error <= accuracy:
+                now = self._with_ends(now, factor)
                 break
             smooth *= 0.1
         refuse_large(now.fields)
@@ -183,8 +193,17 @@ class MemberContactSteps:
         refuse_lost_forces(answer)
         return answer
 
-    def _onto(self, mesh: Mesh, found: Solved, factor: float) -> Solved:
-        """The same state on another mesh.
+    def _with_ends(self, now: Solved, factor: float) -> Solved:
+        """The state with elements that end where lines on obstacles do."""
+        for _ in range(ENDS):
+            moved = None if self.meshes.prescribed else self.run.lines.with_moved_ends(now, self.meshes.accuracy)
+            if moved is None:
+                break
+            now = self._onto(moved[0], now, factor, moved[1])
+        return now
+
+    def _onto(self, mesh: Mesh, found: Solved, factor: float, points: Points | None = None) -> Solved:
+        """The same state on another mesh, with known points or those of the state.
 
         Raises
         ------
@@ -192,7 +211,8 @@ class MemberContactSteps:
             It is not found there.
         """
         mesh, run = replace(mesh, points=()), self.run
-        there = run.resolved(mesh, run.points_on(mesh, found), found, lambda model: model.loading(factor))
+        points = run.lines.points_on(mesh, found) if points is None else points
+        there = run.resolved(mesh, points, found, lambda model: model.loading(factor))
         if there is None or run.turned(found.fields, there.fields) > NEAR:
             self.moved.add(factor)
             there = run.relaxed(mesh, found, lambda model: model.loading(factor))

@@ -85,7 +85,7 @@ class RoughContactSteps:
         """The states of all steps, followed from the undeformed scene, and notes on each."""
         run = MemberContact(self.scene, self.meshes.prepared, self.meshes.accuracy, self.meshes.fixed)
         run.stride, run.first = run.stride * 0.5**level, run.first * 0.5**level
-        run.rough, run.finer = run.rough * 0.1**level, 0.5**level
+        run.rough, run.lines.finer = run.rough * 0.1**level, 0.5**level
         prepared = self.meshes.prepared(mesh)
         zero = undeformed(prepared)
         run.redundant = redundant(prepared.equations, zero.point)

@@ -6,9 +6,10 @@ are a pressure that is linear along each element.  Its row is the mean of the ga
 
     d_i - integral w_i(s) g(r(s)) ds = 0,      d_i = 0,
 
-so that the multiplier of the first row is the force.  With friction further components of ``d_i`` are the means of how
-far places have moved along directions ``t`` across the normal, and their multipliers are the friction, also shared out.
-The integrals are sums over the points at which elements are integrated.
+so that the multiplier of the first row is the force.  One force may also be spread along one of both elements alone:
+the pressure is then linear along each element, but may jump between them.  With friction further components of ``d_i``
+are the means of how far places have moved along directions ``t`` across the normal, and their multipliers are the
+friction, also shared out.  The integrals are sums over the points at which elements are integrated.
 
 Source: mortar methods; Wriggers 2006, Computational Contact Mechanics, section 8.3.
 """

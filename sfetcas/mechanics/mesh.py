@@ -159,6 +159,8 @@ class ContactPoint:
     line : bool
         Whether it is the end of elements along which a member lies on an obstacle, and stands for what presses there,
         see :mod:`~sfetcas.mechanics.contact_lines`.
+    sides : (bool, bool)
+        Whether it does so on the element before it, and on the one beyond.
     """
 
     contact: str
@@ -171,11 +173,18 @@ class ContactPoint:
     new: bool = False
     grip: Grip | None = None
     line: bool = False
+    sides: tuple[bool, bool] = (True, True)
 
     @property
     def name(self) -> str:
         """Name of its rows, and of its places."""
         return f"contacts.{self.contact}, point {self.number + 1}"
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What tells it from other points of a state: what touches, where, and what it stands for."""
+        at = tuple(round(min(max(x, 0.0), 1.0), 9) for x in self.at)
+        return self.contact, self.members, at, self.line and self.sides
 
     @property
     def pair(self) -> tuple[str, tuple[str, ...]]:

@@ -24,6 +24,7 @@ from .terms import GROUND
 
 __all__ = [
     "MOST_COUPLED",
+    "SAME_CUT",
     "Segment",
     "Segments",
     "angle_of",
@@ -160,7 +161,7 @@ def beside_line(mesh: Mesh, point: ContactPoint) -> list[tuple[int, bool, float]
     """Of a point on a line the elements beside it: number along the member, whether they end there, and their share."""
     cut, cuts = standing(mesh, point, 0), mesh.cuts[point.members[0]]
     assert cut is not None
-    elements = [i for i in (cut - 1, cut) if 0 <= i < len(cuts) - 1]
+    elements = [i for i, taken in zip((cut - 1, cut), point.sides, strict=True) if taken and 0 <= i < len(cuts) - 1]
     lengths = np.diff(cuts)[elements]
     return [(i, i < cut, share) for i, share in zip(elements, (lengths / lengths.sum()).tolist(), strict=True)]
 

@@ -1,0 +1,333 @@
+"""Lines: members that lie along an obstacle, or along each other, and the places that stand for that on a mesh.
+
+On an obstacle without friction each element has two forces that are spread along it, one that rises from its start and
+one that falls towards its end, and each end of elements has one that presses at a point, see
+:mod:`~sfetcas.mechanics.contact_lines`.  Which of them push is solved for, see :mod:`~sfetcas.solvers.one_sided`; so
+they make any pressure that is linear along elements, and the forces with which a line presses where it ends.  Elements
+are made to end there.  With friction both forces beside an end of elements are one; between members places at ends of
+elements stand for the line, and elements are halved where it ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .. import tolerances
+from ..description.scene import Scene
+from ..mathematics.arrays import Array
+from ..mechanics.fields import Fields
+from ..mechanics.mesh import ContactPoint, Mesh, breaks_of
+from ..mechanics.segments import SAME_CUT, standing
+from ..solvers.prepared import Solved
+from .closest import Closest, Near, Pair, PairKey
+
+__all__ = ["Lines", "Points", "begun", "points_of"]
+
+Points = tuple[ContactPoint, ...]
+
+LINE, SHORT, ROUND = 3, 4.0, 0.2
+"""Number of points of a pair of members from which on it is taken for a line, parts into which that is divided, and
+angle of something round along which a part is at most, rad.
+"""
+
+BESIDE, LOCATED = 2, 8.0
+"""Elements on either side of the end of a line that are halved, until what the force there bends in one of them is less
+than so many times the accuracy: an eighth of it is the rotation by a force that is off by half an element.
+"""
+
+MORE = 3
+"""Ends of elements beside a line that may become part of it at once."""
+
+ASIDE, AHEAD, ROOM = 4e-6, 0.3, 0.7
+"""How far beside the end of a line it is seen how the member bends away, fraction of its length, and share of the room
+that elements have to be moved after which it is seen again; share of an element that is room.
+"""
+
+SLENDEREST, FELT = 0.05, 1e-3
+"""Length of an element beside the end of a line at least, over that of both beside it, and rotation, over the accuracy,
+that the end of a line makes by being elsewhere, below which it stays.
+"""
+
+SHORTEST = 2
+"""Ends of elements on a line up to which it may be a point."""
+
+
+class Lines:
+    """The lines of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    closest : Closest
+    fixed : collection of str
+        Members whose mesh is prescribed.
+
+    Attributes
+    ----------
+    keys : frozenset
+        Contacts and members that touch along lines, at nodes of the first one.
+    finer : float
+        Share of the parts into which lines are divided that is taken.
+    """
+
+    def __init__(self, scene: Scene, closest: Closest, fixed: Collection[str]) -> None:
+        self.scene, self.closest, self.fixed = scene, closest, fixed
+        self.keys: frozenset[PairKey] = frozenset()
+        self.finer = 1.0
+
+    # -- places -----------------------------------------------------------------------------------
+
+    def bends(self, member: str) -> bool:
+        """Whether a member may lie along what it touches."""
+        return self.scene.members[member].type != "rigid"
+
+    def chosen(self, key: PairKey) -> bool:
+        """Whether it is solved for which places of a line push: on obstacles without friction."""
+        return self.closest.pairs[key].stop is not None and not self.scene.rubs
+
+    def has(self, one: ContactPoint | Near) -> bool:
+        """Whether a place is one of those along a line: not where the second member ends, which slides on the first."""
+        return one.pair in self.keys and beside_ends(one)
+
+    def set_out(self, mesh: Mesh, points: Sequence[ContactPoint]) -> list[ContactPoint]:
+        """Points with their numbers on a mesh, and whether they stand for what is spread along a line."""
+
+        def spread(point: ContactPoint) -> bool:
+            on_line = len(point.members) == 1 and self.has(point) and standing(mesh, point, 0) is not None
+            return on_line and self.bends(point.members[0]) and not (self.chosen(point.pair) and all(point.sides))
+
+        return [replace(point, number=i, line=spread(point)) for i, point in enumerate(points)]
+
+    def laid(self, near: Iterable[Near]) -> list[ContactPoint]:
+        """The points of ends of elements that begin to touch along a line."""
+        return [point for one in near for point in self._laid(begun(one))]
+
+    def _laid(self, point: ContactPoint) -> Iterator[ContactPoint]:
+        if not self.chosen(point.pair):
+            yield point
+            return
+        at, ends = point.at[0], self.closest.pairs[point.pair].ends
+        # Where it is held no obstacle presses at a point.
+        if not (at in (0.0, 1.0) and not ends[int(at)]):
+            yield point
+        if at > 0.0:
+            yield replace(point, sides=(True, False))
+        if at < 1.0:
+            yield replace(point, sides=(False, True))
+
+    def beside(self, mesh: Mesh, points: Sequence[ContactPoint], fields: Fields) -> list[ContactPoint]:
+        """Places near those on lines on obstacles, or inside, that are none of given points."""
+        found, known = list[ContactPoint](), {(p.pair, p.at, p.sides) for p in points}
+        for key in sorted(self.keys):
+            pair = self.closest.pairs[key]
+            if pair.stop is None:
+                continue
+            cuts, own = mesh.cuts[pair.members[0]], [p.at[0] for p in points if p.pair == key]
+            near = {one.at[0]: one for one in self.closest.along(fields, pair, mesh, np.inf)}
+            on = np.isin(cuts, own) | np.array([near[x].gap < 0.0 for x in cuts.tolist()])
+            apart = np.abs(np.arange(len(cuts))[:, None] - np.flatnonzero(on))
+            laid = self.laid(near[x] for x in cuts[apart.min(axis=1, initial=len(cuts)) <= MORE].tolist())
+            # Within a line nothing presses at a point.
+            inner = {x for x in own if all((key, (x,), sides) in known for sides in ((True, False), (False, True)))}
+            laid = [p for p in laid if not (all(p.sides) and p.at[0] in inner)]
+            found += [p for p in laid if (p.pair, p.at, p.sides) not in known]
+        return found
+
+    def deepest(self, fields: Fields, points: Sequence[ContactPoint], tolerance: float) -> list[Near]:
+        """Of ends of elements on lines that penetrate, and are none of given points, those that do so more than the
+        ones beside them; by more than ``tolerance``, m, but with friction on obstacles.
+        """
+        found: list[Near] = []
+        for key in sorted(self.keys):
+            pair = self.closest.pairs[key]
+            cuts = fields.model.mesh.cuts[pair.members[0]]
+            known = {p.at[0] for p in points if p.pair == pair.key}
+            along = self.closest.along(fields, pair, fields.model.mesh, 0.0)
+            near = {one.at[0]: one for one in along if one.at[0] not in known}
+            gaps = np.array([near[x].gap if x in near else 0.0 for x in cuts.tolist()])
+            padded = np.concatenate([[0.0], gaps, [0.0]])
+            # Where all of it is nearly at a gap of zero what is in by rounding would come and go.
+            least = tolerance if pair.stop is None or self.chosen(key) else tolerances.DECIMAL * pair.width
+            deep = (gaps <= padded[:-2]) & (gaps <= padded[2:]) & (gaps < -least)
+            found += [near[x] for x in cuts[deep].tolist()]
+        return found
+
+    # -- from points to lines and back ------------------------------------------------------------
+
+    def lengthened(self, found: Solved) -> tuple[Mesh, Points] | None:
+        """Mesh and points where a pair that touches at many places is taken for a line from now on; None for none."""
+        points, mesh = points_of(found), replace(found.model.mesh, points=())
+        for key, pair in self.closest.pairs.items():
+            own = [p for p in points if p.pair == key and beside_ends(p)]
+            if not self.bends(pair.members[0]):
+                continue
+            if len(own) < LINE if key not in self.keys else not any(point.slides[0] for point in own):
+                continue
+            self.keys |= {key}
+            places = [point.at[0] for point in own]
+            longest = self._longest(pair, places)
+            low, high = min(places) - longest, max(places) + longest
+            mesh = self.divided(mesh, pair, places)
+            near = self.closest.along(found.fields, pair, mesh, 0.1 * pair.width)
+            others = tuple(point for point in points if point not in own)
+            return mesh, (*others, *self.laid(one for one in near if low <= one.at[0] <= high))
+        return None
+
+    def _longest(self, pair: Pair, places: Sequence[float]) -> float:
+        """Longest part of the first member of a pair between places of a line, a fraction of its length."""
+        length = self.closest.lengths[pair.members[0]]
+        turn = np.inf if pair.stop is None or not pair.stop.radius else ROUND * pair.stop.radius / length
+        return float(min(max((max(places) - min(places)) / SHORT, 0.5 * pair.width / length), turn)) * self.finer
+
+    def divided(self, mesh: Mesh, pair: Pair, places: Sequence[float]) -> Mesh:
+        """A mesh with elements of the first member that are not too long near the places of a line."""
+        first, longest = pair.members[0], self._longest(pair, places)
+        low, high = min(places) - longest, max(places) + longest
+        while first not in self.fixed:
+            cuts = mesh.cuts[first]
+            long = (np.diff(cuts) > longest) & (cuts[1:] > low) & (cuts[:-1] < high)
+            if not long.any():
+                return mesh
+            marks = {name: np.zeros(len(c) - 1, bool) for name, c in mesh.cuts.items()}
+            mesh = mesh.refined(marks | {first: long})
+        return mesh
+
+    def shortened(self, found: Solved) -> tuple[frozenset[PairKey], list[Near]]:
+        """Lines on obstacles that are no longer than an element, and where in it their force is."""
+        fields = found.fields
+        short = {
+            key: stretches
+            for key, stretches in self.stretches(found).items()
+            if self.chosen(key) and all(len(stretch) <= SHORTEST for stretch in stretches)
+        }
+        told = [(point, fields.contact_point(point)["push"]) for point in found.model.mesh.points]
+        near: list[Near] = []
+        for key, stretches in short.items():
+            for stretch in stretches:
+                own = [(p.at[0], max(push, 0.0)) for p, push in told if p.pair == key and p.at[0] in stretch]
+                places, pushes = np.array(own).T
+                if pushes.any():
+                    at = np.array([float(places @ pushes / pushes.sum())])
+                    near += self.closest.beside(fields, self.closest.pairs[key], at, np.inf)
+        return frozenset(short), near
+
+    # -- ends -------------------------------------------------------------------------------------
+
+    def stretches(self, found: Solved) -> dict[PairKey, list[list[float]]]:
+        """Of each line the ends of elements that touch, those together that follow each other: fractions, rising."""
+        stretches: dict[PairKey, list[list[float]]] = {}
+        mesh, points = found.model.mesh, points_of(found)
+        for key in sorted(key for key in self.keys if self.bends(key[1][0])):
+            cuts, own = mesh.cuts[key[1][0]], set[int]()
+            for point in (point for point in points if point.pair == key and self.has(point)):
+                cut = mesh.cut_at(key[1][0], point.at[0])
+                # What is spread is so along all of the element.
+                spread = point.line and not all(point.sides)
+                own |= {cut, cut + (-1 if point.sides[0] else 1)} if spread else {cut}
+            last = -2
+            for number in sorted(own):
+                if number != last + 1:
+                    stretches.setdefault(key, []).append([])
+                stretches[key][-1].append(float(cuts[number]))
+                last = number
+        return stretches
+
+    def points_on(self, mesh: Mesh, found: Solved) -> Points:
+        """The points of a state on a finer mesh, with those of lines at new ends of elements between old ones."""
+        points = points_of(found)
+        for key, stretches in self.stretches(found).items():
+            known = {(p.at[0], p.sides) for p in points if p.pair == key}
+            near = self.closest.along(found.fields, self.closest.pairs[key], mesh, np.inf)
+            laid = self.laid(one for one in near if any(s[0] <= one.at[0] <= s[-1] for s in stretches))
+            ends = {x for stretch in stretches for x in (stretch[0], stretch[-1])}
+            laid = [p for p in laid if not (self.chosen(key) and all(p.sides)) or p.at[0] in ends]
+            points = (*points, *(p for p in laid if (p.at[0], p.sides) not in known))
+        return points
+
+    def rough_ends(self, found: Solved, accuracy: float) -> dict[str, Array]:
+        """Marks of the elements, by member, in which lines end and where that is therefore not known well enough.
+
+        There a force presses at a point, and where in the element is open: what that bends is an error of rotations.
+        Not of lines whose ends elements follow.
+        """
+        fields, mesh = found.fields, found.model.mesh
+        marks = {name: np.zeros(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
+        pushes = {(p.pair, p.at[0]): fields.contact_point(p)["push"] for p in mesh.points}
+        scales = found.model.scales
+        for key, stretches in self.stretches(found).items():
+            first = key[1][0]
+            lengths = np.diff(mesh.cuts[first]) * self.closest.lengths[first] / scales.length
+            for stretch in stretches if not self.chosen(key) else ():
+                for at, inner in ((stretch[0], stretch[1:2]), (stretch[-1], stretch[-2:-1])):
+                    if not 0.0 < at < 1.0:
+                        continue
+                    force = sum(pushes.get((key, x), 0.0) for x in {at, *inner}) / scales.force
+                    cut = mesh.cut_at(first, at)
+                    near = slice(max(cut - BESIDE, 0), cut + BESIDE)
+                    bends = force * lengths[near] ** 2 / fields.stiffness(first, at)
+                    marks[first][near] |= bends > LOCATED * accuracy
+        return marks
+
+    def with_moved_ends(self, found: Solved, accuracy: float) -> tuple[Mesh, Points] | None:
+        """Mesh and points where elements end where lines on obstacles do; None where they do well enough."""
+        mesh, moved = found.model.mesh, dict[tuple[str, float], float]()
+        for key, stretches in self.stretches(found).items():
+            member, follows = key[1][0], self.chosen(key) and key[1][0] not in self.fixed
+            breaks = breaks_of(self.scene, member)
+            for stretch in stretches if follows else ():
+                for at, way in ((stretch[0], -1), (stretch[-1], 1)):
+                    if 0.0 < at < 1.0 and np.abs(breaks - at).min() > SAME_CUT and (member, at) not in moved:
+                        there = self._end(found, key, at, way if len(stretch) > 1 else 0, accuracy)
+                        moved |= {} if there == at else {(member, at): there}
+        if not moved:
+            return None
+        cuts = {m: np.array([moved.get((m, x), x) for x in c.tolist()]) for m, c in mesh.cuts.items()}
+        points = tuple(
+            replace(p, at=tuple(moved.get((m, x), x) for m, x in zip(p.members, p.at, strict=True)))
+            for p in points_of(found)
+        )
+        return replace(mesh, cuts=cuts, points=()), points
+
+    def _end(self, found: Solved, key: PairKey, at: float, way: int, accuracy: float) -> float:
+        """Where a line ends that has its last end of elements at a place, on the side ``way`` of it, 1 or -1.
+
+        Beyond it the curvature of the gap grows evenly, from zero, which it is along the line: the end is where that
+        begins.  What touches alone, ``way`` 0, does so where the gap is least.
+        """
+        member, fields, unit = key[1][0], found.fields, found.model.scales.length
+        cuts, length = found.model.mesh.cuts[member], self.closest.lengths[member] / unit
+        cut = found.model.mesh.cut_at(member, at)
+        before, beyond = float(cuts[cut - 1]) - at, float(cuts[cut + 1]) - at
+        ahead = AHEAD * ROOM * (beyond if way > 0 else -before)
+        slope, bends = self.closest.bends(fields, key, at + way * ASIDE)
+        grows = self.closest.bends(fields, key, at + way * (ASIDE + ahead))[1] - bends
+        if way == 0:
+            apart = -slope / (bends * unit * length) if bends > 0.0 else 0.0
+        else:
+            apart = -way * bends * ahead / grows if grows > 0.0 else 0.0
+        # Elements do not become too short: what is in less than one is a point.
+        least = SLENDEREST * (beyond - before)
+        low, high = max(ROOM * before, min(before + least, 0.0)), min(ROOM * beyond, max(beyond - least, 0.0))
+        apart = min(max(apart, low), high)
+        far = abs(apart) * length > accuracy and abs(bends * unit * apart) * length > FELT * accuracy
+        return at + apart if far else at
+
+
+def points_of(found: Solved) -> Points:
+    """The points of a state, where they are now."""
+    return tuple(replace(point, at=found.fields.contact_point(point)["at"]) for point in found.model.mesh.points)
+
+
+def beside_ends(one: ContactPoint | Near) -> bool:
+    """Whether a place is not where the second member ends."""
+    return all(0.0 < x < 1.0 for x in one.at[1:])
+
+
+def begun(near: Near) -> ContactPoint:
+    """A point that begins where surfaces are nearest to each other."""
+    x, y, z = near.normal.tolist()
+    still = (False,) * len(near.at)
+    return ContactPoint(near.contact, near.members, near.at, still, near.distance, normal=(x, y, z), new=True)

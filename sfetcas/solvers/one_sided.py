@@ -1,0 +1,149 @@
+"""Equilibria in which some rows push one way only: which of them do is solved together with all else.
+
+In each of Newton's steps the system is linear but for the choice: a row either acts, its gap zero and its push not
+below zero, or it does not, its push zero and its gap not below zero.  With all other unknowns eliminated that is a
+linear complementarity problem, which is solved by pivots from the rows that acted before.
+
+Source: Murty 1974 (single pivots); Judice and Pires 1994 (blocks of them).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .. import tolerances
+from ..mathematics.arrays import Array, Index
+from ..mechanics.equations import Equations, Point, State
+from .newton import AtLoads, Balance
+
+__all__ = ["OneSided", "complementary"]
+
+BLOCKS = 8
+"""Block pivots without fewer wrong signs, after which single ones follow."""
+
+PIVOTS = 20
+"""Pivots at most, over the number of rows."""
+
+AGAIN, TIMES = 1e-8, 2
+"""Relative residual from which on a choice that was made so many times is taken: others differ from it by rounding."""
+
+ROUNDING = 1e-11
+"""Share of the largest gap, and of the largest push, up to which a wrong sign is rounding."""
+
+
+@dataclass(frozen=True)
+class OneSided(AtLoads):
+    """An equilibrium under given loads with rows that push one way only.
+
+    Attributes
+    ----------
+    pushing : ndarray (m,)
+        Numbers of these rows among all rows: their residual is a gap, their multiplier minus the push.
+    acting : ndarray (m,) of bool
+        Which of them act; kept up to date by :meth:`step`.
+    """
+
+    pushing: Index = field(default_factory=lambda: np.zeros(0, np.intp))
+    acting: Array = field(default_factory=lambda: np.zeros(0, bool))
+    _tried: dict[bytes, int] = field(default_factory=dict)
+
+    def seen(self, state: State, point: Point) -> Point:
+        """The equations with pulls of rows that act, and gaps of those that do not where they are below zero."""
+        seen = super().seen(state, point)
+        residual, rows = seen.residual.copy(), self.equations.unknowns + self.pushing
+        forces = state.lam[self.pushing]
+        pulls = np.where(forces > ROUNDING * np.abs(forces).max(initial=0.0), forces, 0.0)
+        residual[rows] = np.where(self.acting, np.hypot(residual[rows], pulls), np.minimum(residual[rows], 0.0))
+        return replace(seen, residual=residual)
+
+    def step(self, here: Balance) -> Array:
+        """Newton's step (total,), dimensionless, to the rows that act then."""
+        equations, rows, forces = self.equations, self.equations.unknowns + self.pushing, here.state.lam[self.pushing]
+        point = super().seen(here.state, here.plain)
+        moved = self._moved(point, rows)
+        # Pushes of rows that act, gaps of those that do not.
+        gaps, pushes = _times(equations, point.entries, moved, rows), -moved[rows]
+        gaps[:, 0] += point.residual[rows]
+        pushes[:, 0] -= forces
+        basic = np.where(self.acting[:, None], pushes, gaps)
+        found = complementary(basic[:, 1:], basic[:, 0])
+        if found is None:
+            return self._without_flat(moved[:, 0])
+        self.acting[found > 0.0] ^= True
+        if here.residual <= AGAIN:
+            chosen = self.acting.tobytes()
+            self._tried[chosen] = self._tried.get(chosen, 0) + 1
+        step = moved @ np.append(1.0, found)
+        step[rows[~self.acting]] = -forces[~self.acting]
+        return self._without_flat(step)
+
+    def _moved(self, point: Point, rows: Index) -> Array:
+        """Newton's step with the rows that act, and what a push of each other row, or a gap of each of these, changes:
+        columns (total, 1 + m).
+        """
+        equations = self.equations
+        idle = np.zeros(equations.total, bool)
+        idle[rows[~self.acting]] = True
+        entries = np.where(idle[equations.row] | idle[equations.column], 0.0, point.entries)
+        entries[equations.diagonal[rows[~self.acting]]] = -1.0
+        equations.solver.factor(equations.regularised(entries, tolerances.PROXIMAL * self.weight, tolerances.DUAL))
+        right = np.zeros((equations.total, 1 + len(rows)))
+        right[:, 0] = np.where(idle, 0.0, -point.residual)
+        for k, row in enumerate(rows.tolist(), 1):
+            if idle[row]:
+                mine = (equations.column == row) & ~idle[equations.row]
+                right[equations.row[mine], k] = point.entries[mine]
+            else:
+                right[row, k] = 1.0
+        return equations.solver.solve(right)
+
+    def suffices(self, here: Balance) -> bool:
+        """Whether choices come again and again that differ by rounding."""
+        return here.residual <= AGAIN and max(self._tried.values(), default=0) > TIMES
+
+    @property
+    def complete(self) -> bool:
+        """False: rows that do not act have gaps."""
+        return False
+
+
+def _times(equations: Equations, entries: Array, x: Array, chosen: Index) -> Array:
+    """Chosen rows of the Newton matrix times x (total, k): (chosen, k)."""
+    place = np.full(len(x), -1)
+    place[chosen] = np.arange(len(chosen))
+    mine = place[equations.row] >= 0
+    found = np.zeros((len(chosen), x.shape[1]))
+    np.add.at(found, place[equations.row[mine]], entries[mine, None] * x[equations.column[mine]])
+    return found
+
+
+def complementary(matrix: Array, given: Array) -> Array | None:
+    """The x (n,) with ``x`` and ``given + matrix x`` not below zero, and of each pair one zero; None if none is found.
+
+    ``matrix`` (n, n) has positive principal minors where the energy is convex; elsewhere there may be no solution.
+    """
+    n = len(given)
+    chosen, best, blocks = np.zeros(n, bool), n + 1, BLOCKS
+    for _ in range(PIVOTS * n + 1):
+        x, rest = np.zeros(n), given.copy()
+        if chosen.any():
+            try:
+                x[chosen] = np.linalg.solve(matrix[np.ix_(chosen, chosen)], -given[chosen])
+            except np.linalg.LinAlgError:
+                return None
+            rest = given + matrix[:, chosen] @ x[chosen]
+        signs = np.where(chosen, x, rest)
+        sizes = ROUNDING * np.abs(np.concatenate([signs, given])).max(initial=0.0)
+        wrong = np.flatnonzero(signs < -sizes)
+        if not len(wrong):
+            return x
+        if len(wrong) < best:
+            best, blocks = len(wrong), BLOCKS
+        elif blocks:
+            blocks -= 1
+        else:
+            wrong = wrong[-1:]
+        chosen[wrong] ^= True
+    return None

@@ -1,0 +1,92 @@
+"""Rows that push one way only: which of them act, and lines on obstacles, where that is solved for."""
+
+import numpy as np
+import pytest
+from test_points_on_obstacles import FLOOR, LARGER, cantilever, smaller
+
+from sfetcas import solve
+from sfetcas.solvers.one_sided import complementary
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_pushes_and_gaps_are_complementary(seed):
+    rng = np.random.default_rng(seed)
+    root = rng.standard_normal((12, 12))
+    matrix, given = root @ root.T + 1e-3 * np.eye(12), rng.standard_normal(12)
+    x = complementary(matrix, given)
+    rest = given + matrix @ x
+    # Rounding is that of the solution of a linear system of this condition.
+    size = 1e-9 * np.abs(x).max()
+    assert (x >= -size).all()
+    assert (rest >= -size).all()
+    assert np.abs(x * rest).max() <= size * np.abs(x).max()
+    # By minimisation: the x is that of the least 1/2 x M x + given x with none below zero.
+    assert 0.5 * x @ matrix @ x + given @ x == pytest.approx(-0.5 * x @ matrix @ x, abs=1e-9 * np.abs(x).max() ** 2)
+
+
+def test_pivots_in_blocks_that_go_round_end():
+    """All wrong signs at once go round for ever here: found by a search among positive definite matrices."""
+    matrix = np.array(
+        [
+            [22.05, -6.0, -3.0, -12.0, -11.0, 4.0],
+            [-6.0, 24.05, -13.0, 13.0, -11.0, -10.0],
+            [-3.0, -13.0, 20.05, -9.0, 10.0, 0.0],
+            [-12.0, 13.0, -9.0, 25.05, -6.0, 4.0],
+            [-11.0, -11.0, 10.0, -6.0, 25.05, 6.0],
+            [4.0, -10.0, 0.0, 4.0, 6.0, 17.05],
+        ]
+    )
+    given = np.array([4.0, -3.0, -3.0, -2.0, -3.0, 2.0])
+    x = complementary(matrix, given)
+    rest = given + matrix @ x
+    # Rounding of numbers of the size of a hundred.
+    assert min(x.min(), rest.min()) > -1e-12
+    assert np.abs(x * rest).max() < 1e-12
+
+
+def test_what_has_no_solution_is_told():
+    assert complementary(np.array([[-1.0]]), np.array([-1.0])) is None
+
+
+def test_heavy_beam_on_a_floor_presses_with_its_weight_and_where_it_begins_to_lie():
+    """Against contact as conditions of elements, another code; elements follow where the line ends."""
+    loads = {"w": {"type": "distributed", "member": "beam", "value": [0, -40.0]}}
+    floor = {**FLOOR, "point": [0, -0.1]}
+    other, step = (solve(cantilever(one, loads=loads)).last for one in (floor, smaller(floor)))
+    x = np.linspace(0.0, 1.0, 33)
+    # The accuracy of both is 1e-7 of 1 m.
+    np.testing.assert_allclose(step.along("beam", x)["position"], other.along("beam", x)["position"], atol=2e-7)
+    np.testing.assert_allclose(step.contacts["c"]["force"], other.contacts["c"]["force"], rtol=1e-6, atol=1e-9)
+    # Where a force of 10 stands is known to the root of what it bends.
+    np.testing.assert_allclose(step.contacts["c"]["at"], other.contacts["c"]["at"], atol=3e-5)
+    mesh, fields = step.model.mesh, step.fields
+    end, lengths = step.contacts["c"]["at"][0], np.diff(mesh.cuts["beam"])
+    told = [(point, fields.contact_point(point)["push"]) for point in mesh.points]
+    within = [(p, push) for p, push in told if p.line and p.at[0] > end + 0.1]
+    assert len(within) > 4
+    for point, push in within:
+        cut = mesh.cut_at("beam", point.at[0])
+        assert push == pytest.approx(0.5 * 40.0 * lengths[cut - point.sides[0]], rel=1e-4)
+    # Halving where the line ends takes five times as many.
+    assert mesh.elements < 80
+
+
+def test_line_that_grows_and_shrinks_has_the_force_of_its_length():
+    """A strip that is heavy against its stiffness is lifted by its end: half of what hangs is on the hand."""
+    floor = {**FLOOR, "point": [0, -LARGER], "member_radius": LARGER}
+    scene = cantilever(
+        floor,
+        section={"EI3": 1e-4},
+        nodes={"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        loads={
+            "w": {"type": "distributed", "member": "beam", "value": [0, -4.0]},
+            "F": {"type": "force", "node": "B", "value": [0, 0.2]},
+        },
+        analysis={"accuracy": 1e-6, "steps": [0.5, 1.0, 0.5]},
+    )
+    steps = solve(scene).steps
+    ups = [step.contacts["c"]["force"][1] for step in steps]
+    held = [up + 0.2 * step.factor + step.reaction("A")[0][1] for up, step in zip(ups, steps, strict=True)]
+    np.testing.assert_allclose(held, [4.0 * step.factor for step in steps], rtol=1e-9)
+    # What has been lifted lies down where it lay: without friction the way does not matter.
+    np.testing.assert_allclose(ups[0], ups[2], rtol=1e-6)
