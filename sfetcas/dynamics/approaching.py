@@ -261,9 +261,11 @@ CLOSE = 1e-6
 def _beyond(rows: Rows, q: Array, places: Array, model: Model) -> Array:
     """How far places (n,) are beyond where rows hold, fractions of elements; below zero where they do."""
     found = np.full(len(rows.approaches), -np.inf)
-    _, free = rows.located(q, places)
+    nearest, free = rows.located(q, places)
+    # A place beside one that is held is where it is, not where it would be if none were held.
+    there = np.where([near.held for near in rows.approaches], free, nearest)
     for i, near in enumerate(rows.approaches):
-        for member, e, at, held in zip(near.members, near.elements, free[i].tolist(), near.held, strict=True):
+        for member, e, at, held in zip(near.members, near.elements, there[i].tolist(), near.held, strict=True):
             rigid = model.scene.members[member].type == "rigid"
             last = 0 if rigid else len(model.mesh.cuts[member]) - 2
             if held:
