@@ -12,21 +12,23 @@ is made anew with other rows, and the motion goes on in it from the same state, 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from ..contact.closest import Closest, Near, Pair
 from ..errors import SceneError, SolveError, Status
-from ..mathematics.arrays import TINY, Array
+from ..mathematics.arrays import TINY, Array, Index
 from ..mechanics.clearances import PARALLEL, Rows
 from ..mechanics.equations import State
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import Approach
 from ..mechanics.model import Model
-from .events import Events
-from .integrating import Memory, Passed, Stepper, Taken
+from .events import LOOKED, Events
+from .integrating import SHORTEST, Memory, Passed, Stepper, Taken
 from .motion import Mover
 from .stages import StageEquations
 
@@ -75,21 +77,27 @@ class Approaching:
         self._reach = REACH * self.closest.largest
         self.system = mover.inertia.system
         self.over: Memory | None = None
+        # The rows, and their numbers among those of the mesh.
         self._rows: list[Rows] = []
+        self._order: list[int] = []
         self._events: Events | None = None
         self._there = np.zeros(0)
 
     # -- rows -----------------------------------------------------------------------------------------
 
     def renewed(self, memory: Memory) -> Memory:
-        """The state in the system with the rows of what is near; those act that acted between the same members."""
-        before, acted = self.system, {}
-        for part, acts, held in zip(before.unilateral.parts, memory.acting, memory.held, strict=True):
-            if isinstance(part.spot, Approach) and acts:
-                acted[part.spot.contact, frozenset(part.spot.members)] = held
+        """The state in the system with the rows of what is near; those act that acted, or one in the place of each."""
+        before = self.system
+        acted = [
+            part.spot
+            for part, acts in zip(before.unilateral.parts, memory.acting, strict=True)
+            if isinstance(part.spot, Approach) and acts
+        ]
         found = self._searched(memory)
         self.system = self._build(tuple(found.values()))
         self._rows, self.over = list(Rows.of(self.system.model.connections, self.system.model.mesh)), None
+        known = [near for rows in self._rows for near in rows.approaches]
+        self._order = [known.index(near) for near in self.system.model.mesh.approaches]
         rows, kept = self.system.unilateral, len(before.unilateral) - len(before.model.mesh.approaches)
         lam = np.zeros(self.system.layout.lam)
         own = len(memory.lam) - len(before.model.mesh.approaches)
@@ -97,12 +105,24 @@ class Approaching:
         acting, holding = np.zeros(len(rows)), np.zeros(len(rows))
         acting[:kept], holding[:kept] = memory.acting[:kept], memory.held[:kept]
         opened = self.system.openings(State(memory.q, memory.y, lam, memory.unwrapped), memory.t)
-        for i, part in enumerate(rows.parts[kept:], kept):
-            assert isinstance(part.spot, Approach)
-            close = opened[i] <= CLOSE
-            if close and (memory.t == 0.0 or (part.spot.contact, frozenset(part.spot.members)) in acted):
-                acting[i], holding[i] = 1.0, -rows.signs[i] * opened[i]
+        on = self._going_on(acted, opened[kept:]) if memory.t > 0.0 else np.flatnonzero(opened[kept:] <= CLOSE)
+        acting[kept + on] = 1.0
+        holding[kept + on] = -rows.signs[kept + on] * opened[kept + on]
         return replace(memory, lam=lam, acting=acting, held=holding, last=None, unilateral=rows)
+
+    def _going_on(self, acted: list[Approach], opened: Array) -> Index:
+        """Numbers of the present rows that go on where others acted; ``opened`` (rows,) is how far they are open."""
+        rows = self.system.model.mesh.approaches
+        known = [near.key for near in rows]
+        found = [known.index(near.key) for near in acted if near.key in known]
+        for gone in (near for near in acted if near.key not in known):
+            beside = [
+                i
+                for i, near in enumerate(rows)
+                if i not in found and (near.contact, {*near.members}) == (gone.contact, {*gone.members})
+            ]
+            found += [i for i in sorted(beside, key=lambda i: abs(opened[i])) if opened[i] <= CLOSE][:1]
+        return np.array(found, np.intp)
 
     def _searched(self, memory: Memory) -> dict[object, Approach]:
         """The rows of what is near in a state, by their keys."""
@@ -188,58 +208,80 @@ class Approaching:
     def within(self, taken: Taken) -> Passed | None:
         """What happens first in a step; after it the rows may have come to an end."""
         assert self._events is not None
-        left, flagged = self._left(taken)
-        if left is not None:
+        left, acts = self._left(taken)
+        cut = left is not None and left < 1.0
+        if left is not None and cut:
             (taken,) = self._events.advanced(taken, left)
-        passed = self._events.within(taken)
+        # What sweeps over all of a member within the shortest step is told by the next rows.
+        passed = None if cut and not acts and taken.h <= SHORTEST else self._events.within(taken)
         steps, after = ([taken], taken.after) if passed is None else (passed.steps, passed.after)
-        if (passed is None and left is not None) or self._is_stale(after, flagged):
+        if (passed is None and acts) or self._is_stale(after):
             self.over = after
             return Passed(steps, after, over=True)
-        return passed
+        return Passed(steps, after) if cut else passed
 
-    def _is_stale(self, memory: Memory, flagged: bool) -> bool:
-        """Whether other rows are needed in a state that is far from that of the last search, or where it is ``flagged``
-        that one no longer holds.
+    def _is_stale(self, memory: Memory) -> bool:
+        """Whether other rows are needed in a state that is far from that of the last search, or where one of the
+        present ones no longer holds.
         """
+        left = (self._beyond(memory)[0] > 0.0).any()
         moved = np.linalg.norm(self._relative(memory.position) - self._there, axis=1).max(initial=0.0)
-        if moved * self._mover.model.scales.length < 0.125 * self._reach and not flagged:
+        if moved * self._mover.model.scales.length < 0.125 * self._reach and not left:
             return False
         known, found = {near.key for near in self.system.model.mesh.approaches}, self._searched(memory).keys()
-        return found != known if flagged else not found <= known
+        return found != known if left else not found <= known
 
     def _left(self, taken: Taken) -> tuple[float | None, bool]:
-        """Share of a step after which the first place of a row that acts leaves its element, None where none does; and
-        whether one of another row has left it at the end.
+        """Share of a step after which the first place of a row leaves its element, None where none does; and whether
+        it is one of a row that acts, of which that is located.
         """
-        beyond = self._beyond(taken.after)
-        if not (beyond > 0.0).any():
-            return None, False
         assert self._events is not None
-        acts = [
-            part.spot.key
-            for part, one in zip(self.system.unilateral.parts, taken.begin.acting, strict=True)
-            if one and isinstance(part.spot, Approach)
-        ]
-        own = np.array([near.key in acts for rows in self._rows for near in rows.approaches])
-        if not (beyond[own] > 0.0).any():
-            return None, True
-        events = self._events
+        at, there = self._events.at, functools.partial(self._events.interpolated, taken)
+        before, beside = self._beyond(taken.begin)
+        acts = taken.begin.acting[len(taken.begin.acting) - len(before) :] > 0.0
+        for low, high in pairwise(LOOKED.tolist()):
+            beyond, now = self._beyond(taken.after if high == 1.0 else there(high))
+            if (beyond[acts] > 0.0).any():
+                return self._located(functools.partial(at, taken), acts, low, high), True
+            # What is beyond from the begin is so by rounding.
+            idle = (beyond > 0.0) & (before <= 0.0)
+            if idle.any():
+                share = self._located(there, idle, low, high)
+                return min(max(share, SHORTEST / taken.h), 1.0), False
+            passed = (beside * now < 0.0).any(axis=1)
+            if passed.any() and (share := self._passing(taken, passed, beside, low, high)) is not None:
+                return share, False
+            beside = now
+        return None, False
 
-        def left(share: float) -> float:
-            return float(self._beyond(events.at(taken, share))[own].max())
-
-        low, high = 0.0, 1.0
+    def _located(self, there: Callable[[float], Memory], rows: Array, low: float, high: float) -> float:
+        """Share of a step, between two of them, after which the first place of some rows leaves its element."""
         while high - low > WITHIN:
             share = 0.5 * (low + high)
-            low, high = (low, share) if left(share) > 0.0 else (share, high)
-        return high, False
+            left = (self._beyond(there(share))[0][rows] > 0.0).any()
+            low, high = (low, share) if left else (share, high)
+        return high
 
-    def _beyond(self, memory: Memory) -> Array:
+    def _passing(self, taken: Taken, rows: Array, beside: Array, low: float, high: float) -> float | None:
+        """Share of a step at which members are nearest between ends beside which some rows are, before and after it.
+
+        None where there is none: what turns through the parallel in a plane is nearest at one end, then at the other.
+        """
+        assert self._events is not None
+        while high - low > WITHIN:
+            share = 0.5 * (low + high)
+            beyond, now = self._beyond(self._events.interpolated(taken, share))
+            if (beyond[rows] > 0.0).any():
+                return share
+            low, high = (low, share) if (beside * now < 0.0)[rows].any() else (share, high)
+        return None
+
+    def _beyond(self, memory: Memory) -> tuple[Array, Array]:
         """As of :func:`_beyond`, of all rows."""
-        places = self._places(memory.x)
-        found = [_beyond(rows, memory.q, places, self.system.model) for rows in self._rows]
-        return np.concatenate([np.zeros(0), *found])
+        places, found = self._places(memory.x), [(np.zeros(0), np.zeros((0, 2)))]
+        found += [_beyond(rows, memory.q, places, self.system.model) for rows in self._rows]
+        beyond, beside = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return beyond[self._order], beside[self._order]
 
     def _places(self, x: Array) -> Array:
         """Displacements or velocities (places, axes) of all places among those of the quantities."""
@@ -258,20 +300,25 @@ CLOSE = 1e-6
 """Opening, unit of length, up to which a row begins as one that acts."""
 
 
-def _beyond(rows: Rows, q: Array, places: Array, model: Model) -> Array:
-    """How far places (n,) are beyond where rows hold, fractions of elements; below zero where they do."""
-    found = np.full(len(rows.approaches), -np.inf)
+def _beyond(rows: Rows, q: Array, places: Array, model: Model) -> tuple[Array, Array]:
+    """How far places (n,) are beyond where rows hold, fractions of elements; below zero where they do.
+
+    Also beside which end (n, 2) of the members they would be if none were held: -1 before it, 1 behind it, else 0.
+    """
+    found, beside = np.full(len(rows.approaches), -np.inf), np.zeros((len(rows.approaches), 2))
     nearest, free = rows.located(q, places)
     # A place beside one that is held is where it is, not where it would be if none were held.
     there = np.where([near.held for near in rows.approaches], free, nearest)
     for i, near in enumerate(rows.approaches):
-        for member, e, at, held in zip(near.members, near.elements, there[i].tolist(), near.held, strict=True):
+        sides = zip(near.members, near.elements, there[i].tolist(), near.held, strict=True)
+        for side, (member, e, at, held) in enumerate(sides):
             rigid = model.scene.members[member].type == "rigid"
             last = 0 if rigid else len(model.mesh.cuts[member]) - 2
             if held:
                 # Something between the ends is nearer.
                 own = min(at, 1.0 - at) - EDGE
+                beside[i, side] = 0.0 if own > 0.0 else np.sign(at - 0.5)
             else:
                 own = max(-at - (MARGIN if e > 0 else EDGE), at - 1.0 - (MARGIN if e < last else EDGE))
             found[i] = max(found[i], own)
-    return found
+    return found, beside

@@ -45,7 +45,7 @@ from .impacts import Collision, Impacts
 from .integrating import SHORTEST, Memory, Passed, Stepper, Taken
 from .sampling import turned_by
 
-__all__ = ["TOGETHER", "Event", "Events"]
+__all__ = ["LOOKED", "TOGETHER", "Event", "Events"]
 
 
 @dataclass(frozen=True)
@@ -131,8 +131,9 @@ class Events:
         self._accepted = np.where(self._of_obstacles, late, 0.0)
         self.rows, self.signs = self.system.unilateral.rows, self.system.unilateral.signs
         self._impacts, self.found = Impacts(self.system), list[Event]()
-        # When it happened last, and how often at the same time before.
+        # When it happened last, how often at the same time before, and how often each row has closed then.
         self._offset, self._last, self._again = np.zeros(len(self.rows)), -np.inf, 0
+        self._hops = np.zeros(len(self.rows), int)
         # When each row was hit last, and how far inside it was when it happened last.
         self._hit = np.full(len(self.rows), -1e300)
         self._depth = self._offset
@@ -162,9 +163,15 @@ class Events:
         return after
 
     def resumed(self, memory: Memory, h: float) -> Memory:
-        """The state from which the motion goes on in a system with other rows, with those that act."""
-        nothing = np.zeros(len(self.rows), bool)
-        return self._after(memory, nothing, nothing, h) if memory.acting.any() else memory
+        """The state from which the motion goes on in a system with other rows, with those of them that act.
+
+        What is closed but moves has yet to be hit, or leaves.
+        """
+        nothing, touching = np.zeros(len(self.rows), bool), memory.acting > 0.0
+        if not touching.any():
+            return memory
+        touching &= np.abs(self._impacts.at(memory).speeds(nothing, touching)) < RESTS
+        return self._after(replace(memory, acting=touching.astype(float)), nothing, nothing, h)
 
     def longest(self, memory: Memory) -> float:
         """No step is too long."""
@@ -194,8 +201,10 @@ class Events:
         if halted is not None and share == halted:
             return Passed(steps, self._after(memory, nothing, nothing, taken.h))
         if released is None or share < released:
-            opened = np.where(acting, np.inf, self._openings(memory))
-            # The first of them, which may be at the end of a step that is too short, and those that close with it.
+            # What closes within a step that is too short closes at once.
+            ahead = memory if steps else self.advanced(taken, max(share, SHORTEST / taken.h))[-1].after
+            opened = np.where(acting, np.inf, self._openings(ahead))
+            # The first of them, and those that close with it.
             closes = opened <= max(TOGETHER, float(opened.min()))
             return Passed(steps, self._after(memory, closes, nothing, taken.h))
         soon = self._soon(self._consistent(memory), self._length(taken.h))
@@ -322,24 +331,30 @@ class Events:
 
     def _course(self, taken: Taken) -> tuple[Array, Array]:
         """Shares of a step (n,), evenly spaced, and the interpolated openings (n, rows) there."""
-        shares = np.linspace(0.0, 1.0, LOOKS + 1)
-        found = [self._interpolated(taken, share) for share in shares[:-1].tolist()]
-        return shares, np.array([*found, self._opened(taken.after.q, taken.after.y, taken.after.t, taken.after)])
+        found = [self._interpolated(taken, share) for share in LOOKED[:-1].tolist()]
+        return LOOKED, np.array([*found, self._opened(taken.after.q, taken.after.y, taken.after.t, taken.after)])
 
     def _interpolated(self, taken: Taken, share: float) -> Array:
-        """The openings (rows,) at a share of a step, by the polynomial through its stages."""
+        """The openings (rows,) at a share of a step, see :meth:`interpolated`."""
+        there = self.interpolated(taken, share)
+        return self._opened(there.q, there.y, there.t, there)
+
+    @staticmethod
+    def interpolated(taken: Taken, share: float) -> Memory:
+        """The places at a share of a step, by the polynomial through its stages; all else is as at its begin."""
         begin, last = taken.begin, taken.begin.last
         nodes = np.array([0.0, *taken.places])
-        turns = np.concatenate([np.zeros((1, *taken.turns.shape[1:])), taken.turns])
-        shifts = np.concatenate([np.zeros((1, taken.shifts.shape[1])), taken.shifts])
+        parts = [taken.turns, taken.shifts, taken.x - begin.x]
+        parts = [np.concatenate([np.zeros((1, *part.shape[1:])), part]) for part in parts]
         if len(taken.places) == 1 and last is not None:
             # One stage alone makes a line.
             nodes = np.array([-last.h / taken.h, *nodes])
-            turns = np.concatenate([-last.turns[-1:], turns])
-            shifts = np.concatenate([-last.shifts[-1:], shifts])
+            before = last.turns[-1:], last.shifts[-1:], last.x[-1:] - last.begin.x
+            parts = [np.concatenate([-one, part]) for one, part in zip(before, parts, strict=True)]
         row = evaluation(nodes, np.array([share]))[0]
-        q = turned_by(begin.q, np.einsum("n,nra->ra", row, turns))
-        return self._opened(q, begin.y + row @ shifts, begin.t + share * taken.h, begin)
+        turned, shift, moved = (np.einsum("n,n...->...", row, part) for part in parts)
+        q = turned_by(begin.q, turned)
+        return replace(begin, t=begin.t + share * taken.h, q=q, y=begin.y + shift, x=begin.x + moved)
 
     def _released(self, taken: Taken) -> float | None:
         """Share of a step after which the first row ceases to act; None where none does."""
@@ -445,15 +460,16 @@ class Events:
         self._again = self._again + 1 if memory.t == self._last else 0
         # What closes again and again at one time hops for less than the shortest step.
         speeds = collision.speeds(before, closes)
-        ebbed = closes.copy() if self._again > HOPS else self._ebbing(memory.t, speeds)
+        self._hops = np.where(closes, self._hops + 1, self._hops) if self._again else closes.astype(int)
+        ebbed = self._ebbing(memory.t, speeds) | (closes & (self._hops > HOPS))
         # What has hopped no further than is accepted does not rebound once more.
         hop = speeds * (memory.t - self._hit)
-        quiet = self._of_obstacles & (speeds > 0.0) & (hop < self._late)
+        quiet = ebbed | (self._of_obstacles & (speeds > 0.0) & (hop < self._late))
         if self._rocks:
             self._small = np.where(speeds > 0.0, np.where(hop < self._accepted, self._small + 1, 0), self._small)
-            ebbed = ebbed | (closes & (self._small > CALM))
+            quiet |= closes & (self._small > CALM)
         self._hit = np.where(speeds > 0.0, memory.t, self._hit)
-        velocity, impulses, touching, lost = collision.solved(before | ebbed, closes & ~ebbed, quiet)
+        velocity, impulses, touching, lost = collision.solved(before, closes, quiet)
         opened = self._opened(memory.q, memory.y, memory.t, memory)
         self._depth = np.maximum(-opened, 0.0)
         self._offset, self._last = self._depth.copy(), memory.t
@@ -659,8 +675,13 @@ def _with_velocity(rates: Array, velocity: Array) -> Array:
 SOON = 1e-3 * 0.25 ** np.arange(4)
 """Shares of the motion, the longest first, at whose end all is found together that follows an event."""
 
-HOPS = 2
-"""Events one after the other at the same time, after which rows that close stay closed."""
+HOPS = 4
+"""Times that a row closes at one time, after which it stays closed."""
+
+RESTS = 1e-4
+"""Speed of opening or closing, dimensionless, below which a row that is closed may act in place of another one: lines
+beyond their elements differ by less.
+"""
 
 CALM = 3
 """Hops no further than is accepted, after which what rocks to and fro on other members and obstacles is at rest."""
@@ -695,8 +716,8 @@ they are over.
 PARTS = 4
 """Steps of a method with one stage up to an event."""
 
-LOOKS = 8
-"""Parts of a step at whose ends openings are looked at."""
+LOOKED = np.linspace(0.0, 1.0, 9)
+"""Shares of a step at which openings, and places, are looked at."""
 
 ROUNDING = 1e-12
 """Of openings, unit of length or rad."""

@@ -36,7 +36,7 @@ __all__ = ["PARALLEL", "Clearance", "Rows", "clearances_in"]
 STEPS = 6
 """Steps of Newton's method to the nearest places, from those at which a row was made, at most an element away."""
 
-PARALLEL = 1e-4
+PARALLEL = 1e-8
 """Square of the sine of the angle of lines below which it is open where they are nearest."""
 
 
