@@ -293,3 +293,139 @@ def test_an_unknown_member_is_named(kind):
     table["contacts"] = {"c": {"type": kind, "members": ["a", "zz"], **plane}}
     with pytest.raises(SceneError, match=r"contacts\.c\.members: found 'zz', accepted: a, b"):
         Scene.from_dict(table)
+
+
+def toppling(over, lengths=(1.0, 1.0), radius=RADIUS, gravity=10.0, gap=0.0, tilt=0.0, restitution=0.0, plane=False):
+    """A bar that lies along a clamped one, or falls on it, with its centre ``over`` beyond its end, which is at zero."""
+    c, s, half = np.cos(tilt), np.sin(tilt), 0.5 * lengths[1]
+    at = {"a0": (-lengths[0], 0.0), "a1": (0.0, 0.0)}
+    height = 2.0 * radius + gap
+    at |= {"b0": (over - half * c, height - half * s), "b1": (over + half * c, height + half * s)}
+    placed = {name: {"position": [x, z] if plane else [x, 0.0, z]} for name, (x, z) in at.items()}
+    placed["a0"]["support"] = "clamped"
+    return Scene.from_dict(
+        {
+            "dimension": "plane" if plane else "space",
+            "gravity": [0.0, -gravity] if plane else [0.0, 0.0, -gravity],
+            "sections": {"rod": {**SECTION, "radius": radius}},
+            "nodes": placed,
+            "members": {name: {"nodes": [f"{name}0", f"{name}1"], "type": "rigid", "section": "rod"} for name in "ab"},
+            "contacts": {"pair": {"type": "members", "members": ["a", "b"], "restitution": restitution}},
+            "analysis": {"type": "dynamic", "end": 0.25, "accuracy": 1e-6},
+        }
+    )
+
+
+def toppled(over, length, radius, gravity, begin, speeds, end):
+    """Place of the centre and angle of a bar that slides without friction over a round end at zero, by other means."""
+    inertia = length**2 / 12.0 + radius**2 / 4.0
+
+    def change(_, state):
+        x, z, turn, *rates = state
+        n, t = np.array([-np.sin(turn), np.cos(turn)]), np.array([np.cos(turn), np.sin(turn)])
+        out, v, w = np.array([x, z]), np.array(rates[:2]), rates[2]
+        row = np.array([*n, -t @ out])
+        # The second derivative of n . out = 2 r at constant velocities.
+        bend = -2.0 * w * (t @ v) - w**2 * (n @ out)
+        free = np.array([0.0, -gravity, 0.0])
+        push = -(row @ free + bend) / (1.0 + row[2] ** 2 / inertia)
+        return [*rates, *(free + push * row / [1.0, 1.0, inertia])]
+
+    state = [over, 2.0 * radius, 0.0, *speeds]
+    return solve_ivp(change, (begin, end), state, method="DOP853", rtol=1e-12, atol=1e-13).y[:3, -1]
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"over": 0.1},
+        {"over": 0.1, "plane": True},
+        {"over": 0.1, "gap": 0.01},
+        {"over": 0.1, "gap": 0.01, "plane": True},
+        {"over": 0.3, "lengths": (0.5, 0.8), "gravity": 3.0},
+        {"over": 0.2, "radius": 2e-3, "gap": 0.005},
+        {"over": 0.4, "lengths": (0.4, 1.2), "radius": 0.02},
+    ],
+)
+def test_a_bar_topples_over_the_end_of_a_parallel_one(given):
+    """It lies along the other one, or falls on it, and turns about its end, as by the equations of a rigid body."""
+    scene = toppling(**given)
+    motion = solve(scene)
+    over, gap = given["over"], given.get("gap", 0.0)
+    length, radius, gravity = given.get("lengths", (1, 1))[1], given.get("radius", RADIUS), given.get("gravity", 10.0)
+    begin, speeds = 0.0, (0.0, 0.0, 0.0)
+    if gap:
+        fall = np.sqrt(2.0 * gravity * gap)
+        inertia = length**2 / 12.0 + radius**2 / 4.0
+        push = fall / (1.0 + over**2 / inertia)
+        begin, speeds = fall / gravity, (0.0, push - fall, -over * push / inertia)
+        assert motion.events[0].time == pytest.approx(begin, abs=1e-9)
+    x, z, turn = toppled(over, length, radius, gravity, begin, speeds, 0.25)
+    ends = motion.last.position("b0"), motion.last.position("b1")
+    up = 1 if given.get("plane") else 2
+    centre, along = 0.5 * (ends[0] + ends[1]), (ends[1] - ends[0]) / length
+    # To ten times the accuracy that was asked for.
+    assert [centre[0], centre[up]] == pytest.approx([x, z], abs=1e-5)
+    assert np.arcsin(along[up]) == pytest.approx(turn, abs=1e-5)
+    totals = motion.energies() + np.array([step.energy["dissipated"] for step in motion.steps])
+    assert np.ptp(totals) < 1e-5 * motion.energies("kinetic").max()
+    # At the ends of steps; between them answers are interpolated.
+    marks = motion.record.times * motion.last.mover.time
+    closely = motion.between(marks[marks <= 0.25])
+    assert min(np.min(step.contacts["pair"]["gap"]) for step in closely) > -1e-6 * radius
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("plane", [False, True])
+@pytest.mark.parametrize("tilt", [0.0, 1e-3, -1e-3])
+def test_a_bar_rebounds_and_topples(tilt, plane):
+    """With restitution it rebounds ever lower on the end of the other one, and then turns about it."""
+    motion = solve(toppling(0.1, gap=0.01, tilt=tilt, restitution=0.5, plane=plane))
+    assert motion.events[0].impulse > 0.0
+    assert motion.last.contacts["pair"]["gap"] == pytest.approx(0.0, abs=1e-4 * RADIUS)
+    totals = motion.energies() + np.array([step.energy["dissipated"] for step in motion.steps])
+    assert np.ptp(totals) < 1e-5 * motion.energies("kinetic").max()
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("tilt", [2.5e-6, 1e-8])
+def test_nearly_parallel_bars_collide(tilt, restitution):
+    """Both ends hit one after the other, sooner than any step: what is lost is told, and both momenta are kept."""
+    c, s = 0.5 * np.cos(tilt), 0.5 * np.sin(tilt)
+    motion = solve(bars(((-c, 0, 0.1 - s), (c, 0, 0.1 + s)), contact={"restitution": restitution}))
+    first = motion.steps[0]
+    for state in motion.steps:
+        # Impacts keep momenta to rounding over the square of the shortest step.
+        assert state.momentum["linear"] == pytest.approx(first.momentum["linear"], abs=1e-9)
+        assert state.momentum["angular"] == pytest.approx(first.momentum["angular"], abs=1e-9)
+    totals = motion.energies() + np.array([step.energy["dissipated"] for step in motion.steps])
+    assert totals == pytest.approx(totals[0], abs=1e-9)
+    assert gaps(motion).min() > -1e-6 * RADIUS
+    apart = [motion.last.velocity(f"b{i}")[2] - motion.last.velocity(f"a{i}")[2] for i in (0, 1)]
+    # Ends turn aside by the tilt, and by what they rotate through until they are asked.
+    assert apart == pytest.approx(after_ends_have_hit(tilt, restitution), abs=1e-4)
+
+
+def after_ends_have_hit(tilt, restitution):
+    """Speeds of opening of both ends of two equal bars, one of which has come down on the other with the speed one."""
+    if not restitution:
+        return [0.0, 0.0]
+    own, other = (2.0 * (1.0 / MASS + sign * 0.25 / INERTIA) for sign in (1.0, -1.0))
+    gap, speed = np.array([0.0, tilt]), np.array([-1.0, -1.0])
+    while (speed < 0.0).any():
+        times = np.where(speed < 0.0, gap / np.maximum(-speed, 1e-300), np.inf)
+        i = int(np.argmin(times))
+        gap = gap + times[i] * speed
+        speed = speed - (1.0 + restitution) * speed[i] / own * np.where(np.arange(2) == i, own, other)
+    return speed
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("yaw", [5e-3, 3e-4, 1e-4])
+def test_bars_that_nearly_lie_along_each_other_touch_where_they_cross(yaw):
+    """At an angle that leaves their ends far beside each other: centre on centre, so that they do not turn."""
+    motion = solve(bars(across(0.0, angle=yaw), contact={"restitution": 1.0}, first=((-0.5, 0, 0), (0.5, 0, 0))))
+    assert motion.events[0].impulse == pytest.approx(MASS, rel=1e-9)
+    assert motion.last.velocity("a0")[2] == pytest.approx(-1.0, abs=1e-6)

@@ -127,6 +127,7 @@ class Events:
         between = [part.spot.distance / unit if isinstance(part.spot, Approach) else np.inf for part in parts]
         self._late = np.minimum(late, INSIDE * np.array(between))
         # Hops that were no further than is accepted, one after the other, of each row beside members that may touch.
+        self._patience, self._brief = np.where(np.isfinite(between), CALM, 0), np.zeros(len(parts), int)
         self._rocks, self._small = bool(np.isfinite(between).any()), np.zeros(len(parts), int)
         self._accepted = np.where(self._of_obstacles, late, 0.0)
         self.rows, self.signs = self.system.unilateral.rows, self.system.unilateral.signs
@@ -462,9 +463,11 @@ class Events:
         speeds = collision.speeds(before, closes)
         self._hops = np.where(closes, self._hops + 1, self._hops) if self._again else closes.astype(int)
         ebbed = self._ebbing(memory.t, speeds) | (closes & (self._hops > HOPS))
-        # What has hopped no further than is accepted does not rebound once more.
+        # What has hopped no further than is accepted does not rebound once more; between members, which may lie along
+        # each other and hit with one end after the other, not for ever.
         hop = speeds * (memory.t - self._hit)
-        quiet = ebbed | (self._of_obstacles & (speeds > 0.0) & (hop < self._late))
+        self._brief = np.where(speeds > 0.0, np.where(hop < self._late, self._brief + 1, 0), self._brief)
+        quiet = ebbed | (self._of_obstacles & (speeds > 0.0) & (self._brief > self._patience))
         if self._rocks:
             self._small = np.where(speeds > 0.0, np.where(hop < self._accepted, self._small + 1, 0), self._small)
             quiet |= closes & (self._small > CALM)
