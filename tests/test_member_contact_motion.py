@@ -296,7 +296,7 @@ def test_an_unknown_member_is_named(kind):
 
 
 def toppling(over, lengths=(1.0, 1.0), radius=RADIUS, gravity=10.0, gap=0.0, tilt=0.0, restitution=0.0, plane=False):
-    """A bar that lies along a clamped one, or falls on it, with its centre ``over`` beyond its end, which is at zero."""
+    """A bar that lies along a clamped one, or falls on it, its centre ``over`` beyond the end, which is at zero."""
     c, s, half = np.cos(tilt), np.sin(tilt), 0.5 * lengths[1]
     at = {"a0": (-lengths[0], 0.0), "a1": (0.0, 0.0)}
     height = 2.0 * radius + gap
@@ -311,7 +311,7 @@ def toppling(over, lengths=(1.0, 1.0), radius=RADIUS, gravity=10.0, gap=0.0, til
             "nodes": placed,
             "members": {name: {"nodes": [f"{name}0", f"{name}1"], "type": "rigid", "section": "rod"} for name in "ab"},
             "contacts": {"pair": {"type": "members", "members": ["a", "b"], "restitution": restitution}},
-            "analysis": {"type": "dynamic", "end": 0.25, "accuracy": 1e-6},
+            "analysis": {"type": "dynamic", "end": 0.25, "step": 1e-3},
         }
     )
 
@@ -365,11 +365,11 @@ def test_a_bar_topples_over_the_end_of_a_parallel_one(given):
     ends = motion.last.position("b0"), motion.last.position("b1")
     up = 1 if given.get("plane") else 2
     centre, along = 0.5 * (ends[0] + ends[1]), (ends[1] - ends[0]) / length
-    # To ten times the accuracy that was asked for.
-    assert [centre[0], centre[up]] == pytest.approx([x, z], abs=1e-5)
-    assert np.arcsin(along[up]) == pytest.approx(turn, abs=1e-5)
+    # Steps of this length leave less, and so does the other way of solving.
+    assert [centre[0], centre[up]] == pytest.approx([x, z], abs=1e-6)
+    assert np.arcsin(along[up]) == pytest.approx(turn, abs=1e-6)
     totals = motion.energies() + np.array([step.energy["dissipated"] for step in motion.steps])
-    assert np.ptp(totals) < 1e-5 * motion.energies("kinetic").max()
+    assert np.ptp(totals) < 1e-8 * motion.energies("kinetic").max()
     # At the ends of steps; between them answers are interpolated.
     marks = motion.record.times * motion.last.mover.time
     closely = motion.between(marks[marks <= 0.25])
@@ -377,15 +377,16 @@ def test_a_bar_topples_over_the_end_of_a_parallel_one(given):
 
 
 @pytest.mark.fast
-@pytest.mark.parametrize("plane", [False, True])
-@pytest.mark.parametrize("tilt", [0.0, 1e-3, -1e-3])
-def test_a_bar_rebounds_and_topples(tilt, plane):
-    """With restitution it rebounds ever lower on the end of the other one, and then turns about it."""
-    motion = solve(toppling(0.1, gap=0.01, tilt=tilt, restitution=0.5, plane=plane))
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize("tilt", [1e-3, -1e-3])
+def test_a_bar_rebounds_and_topples(tilt, restitution):
+    """It comes down aslant, with restitution rebounds ever lower, and then turns about the end of the other one."""
+    motion = solve(toppling(0.1, gap=0.01, tilt=tilt, restitution=restitution))
     assert motion.events[0].impulse > 0.0
     assert motion.last.contacts["pair"]["gap"] == pytest.approx(0.0, abs=1e-4 * RADIUS)
     totals = motion.energies() + np.array([step.energy["dissipated"] for step in motion.steps])
-    assert np.ptp(totals) < 1e-5 * motion.energies("kinetic").max()
+    # Steps of this length are far more accurate than answers between longer ones.
+    assert np.ptp(totals) < 1e-8 * motion.energies("kinetic").max()
 
 
 @pytest.mark.fast
@@ -423,9 +424,65 @@ def after_ends_have_hit(tilt, restitution):
 
 
 @pytest.mark.fast
-@pytest.mark.parametrize("yaw", [5e-3, 3e-4, 1e-4])
+@pytest.mark.parametrize("yaw", [5e-3, 3e-4, 2e-4])
 def test_bars_that_nearly_lie_along_each_other_touch_where_they_cross(yaw):
     """At an angle that leaves their ends far beside each other: centre on centre, so that they do not turn."""
     motion = solve(bars(across(0.0, angle=yaw), contact={"restitution": 1.0}, first=((-0.5, 0, 0), (0.5, 0, 0))))
     assert motion.events[0].impulse == pytest.approx(MASS, rel=1e-9)
     assert motion.last.velocity("a0")[2] == pytest.approx(-1.0, abs=1e-6)
+
+
+def thin(height, speed=10.0, spin=0.0, end=1.0, **more):
+    """A bar of the radius 1e-4 that comes down across another one from a height, and spins across both."""
+    turn = {f"b{i}": {"velocity": [0.0, 0.0, -speed + sign * spin]} for i, sign in ((0, -1.0), (1, 1.0))}
+    table = bars(across(0.1, height=height), speed=speed).to_dict()
+    for name, given in turn.items():
+        table["nodes"][name] |= given
+    table["sections"]["rod"]["radius"] = 1e-4
+    table["analysis"] = {"type": "dynamic", "end": end, **more}
+    return Scene.from_dict(table)
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("height", [5.0, 0.3])
+def test_thin_fast_bars_take_few_steps_far_from_each_other(height):
+    """Ten metres in steps of a diameter would be 50 000 of them; it hits all the same when it has to."""
+    motion = solve(thin(height))
+    assert motion.events[0].time == pytest.approx((height - 2e-4) / 10.0, abs=1e-9)
+    # Most of them are of the bars that slide along each other after the impact, and turn.
+    assert motion.count < 1000
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("spin", [20.0, 200.0])
+def test_a_thin_bar_that_spins_does_not_pass_another_one(spin):
+    """A bar that turns many times on its way does not turn through another one: its end hits it before its centre."""
+    motion = solve(thin(0.62, speed=1.0, spin=spin, end=0.5))
+    assert motion.events
+    # The end reaches down to half the length; it hits before the centre is nearer than the diameter.
+    assert (0.12 - 2e-4) / 1.0 - 1e-3 < motion.events[0].time < 0.62
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("plane", [False, True])
+def test_a_motion_at_rest_has_no_note(plane):
+    """What lies still changes its energy by rounding, which is nothing to tell."""
+    table = toppling(-0.1, plane=plane).to_dict()
+    table["analysis"] = {"type": "dynamic", "end": 0.25, "step": 5e-3}
+    motion = solve(Scene.from_dict(table))
+    assert motion.notes == ()
+    assert motion.last.position("b1") == pytest.approx(motion.steps[0].position("b1"), abs=1e-12)
+
+
+@pytest.mark.fast
+def test_events_tell_members_from_obstacles():
+    """Also where a member has a name that looks like several."""
+    table = bars(across(0.3)).to_dict()
+    table["contacts"]["floor"] = {"type": "plane", "point": [0, 0, -0.2], "normal": [0, 0, 1], "member": "a"}
+    motion = solve(Scene.from_dict(table | {"analysis": {"type": "dynamic", "end": 1.0, "step": 5e-3}}))
+    between = {event.name: event.between_members for event in motion.events}
+    assert between == {"contacts.pair": True, "contacts.floor": False}
+    said = {event.name: str(event) for event in motion.events}
+    assert "each other" in said["contacts.pair"]
+    assert "each other" not in said["contacts.floor"]
+    assert motion.to_dict()["events"][0]["between_members"] is True

@@ -4,8 +4,8 @@ A system has a row for each two places that are nearest to each other and nearer
 impacts, contact and release are those of all unilateral constraints, see :mod:`~sfetcas.dynamics.events`.  The system
 is made anew with other rows, and the motion goes on in it from the same state, where
 
-- a search finds members near to each other without a row; no member moves by more than a quarter of the reach from
-  one search to the next, so that what has no row yet is never touched;
+- a search finds members near to each other without a row; from one search to the next no member moves by half the
+  room, the distance within which all have rows, so that what has no row yet is never touched;
 - a place goes from one element to another, or to the end of its member, or leaves this end: that is located in the
   step.
 """
@@ -38,7 +38,10 @@ REACH = 4.0
 """Distance of surfaces at which members have a row, over the largest sum of radii."""
 
 STRIDE = 0.25
-"""How far members move in a step, over the reach: two that had no row before it are then apart after it."""
+"""How far members move in a step, over the room: two that had no row before it are then apart after it."""
+
+WIDER = 2.0
+"""How far is searched, over the room that was found before: where little is near, what is far is not looked for."""
 
 MARGIN, EDGE = 0.02, 1e-7
 """How far places go beyond an element before another one takes over, and beyond the end of a member, fractions of it:
@@ -75,6 +78,8 @@ class Approaching:
         self.closest = Closest(self._scene)
         self._between = [pair for pair in self.closest.pairs.values() if pair.stop is None]
         self._reach = REACH * self.closest.largest
+        # How far members have to move, m, until something may touch that has no row; how far the next search goes.
+        self._room = self._wide = self._reach
         self.system = mover.inertia.system
         self.over: Memory | None = None
         # The rows, and their numbers among those of the mesh.
@@ -128,7 +133,13 @@ class Approaching:
         """The rows of what is near in a state, by their keys."""
         self._there = self._relative(memory.position)
         fields, found = self._fields(memory), dict[object, Approach]()
-        for near in self.closest.found(fields, self._reach, self._between):
+        all_found = self.closest.found(fields, self._wide, self._between)
+        free = min(map(self._free, all_found), default=np.inf)
+        self._room = max(min(self._wide, free), self._reach)
+        self._wide = self._reach if free <= self._reach else max(min(WIDER * self._room, self._scene.size), self._reach)
+        for near in all_found:
+            if near.gap >= self._reach:
+                continue
             pair = self.closest.pairs[near.pair]
             self._refuse_deep(near, memory)
             for one in (near, *self._ends(fields, pair)):
@@ -136,6 +147,14 @@ class Approaching:
                 if approach is not None:
                     found.setdefault(approach.key, approach)
         return found
+
+    def _free(self, near: Near) -> float:
+        """How far members that are near to each other somewhere may be from touching without a row, m."""
+        if near.gap >= self._reach:
+            return near.gap
+        rigid = all(self._scene.members[member].type == "rigid" for member in near.members)
+        # Lines that are straight are nearest at one place, which is followed.
+        return min(self.closest.lengths[member] for member in near.members) if rigid else self._reach
 
     def _ends(self, fields: Fields, pair: Pair) -> Iterator[Near]:
         """Ends of either member that are near to the other one."""
@@ -196,14 +215,15 @@ class Approaching:
     def longest(self, memory: Memory) -> float:
         """The longest step from a state in which nothing can be touched that has no row."""
         speed = float(np.linalg.norm(self._relative(memory.rates[0]), axis=1).max(initial=0.0))
-        return STRIDE * self._reach / self._mover.model.scales.length / max(speed, TINY)
+        return STRIDE * self._room / self._mover.model.scales.length / max(speed, TINY)
 
     def far(self, taken: Taken) -> bool:
         """Whether members have moved so far in a step that some without a row may have touched or passed each other."""
-        moved = self._relative(taken.after.position) - self._relative(taken.begin.position)
-        length = float(np.linalg.norm(moved, axis=1).max(initial=0.0)) * self._mover.model.scales.length
+        begin, unit = self._relative(taken.begin.x), self._mover.model.scales.length
+        # What turns round is back at the end of a step.
+        moved = [np.linalg.norm(self._relative(x) - begin, axis=1).max(initial=0.0) for x in taken.x]
         # A step at constant speed is not refused for rounding.
-        return length > 1.25 * STRIDE * self._reach
+        return float(max(moved)) * unit > 1.25 * STRIDE * self._room
 
     def within(self, taken: Taken) -> Passed | None:
         """What happens first in a step; after it the rows may have come to an end."""
@@ -226,7 +246,7 @@ class Approaching:
         """
         left = (self._beyond(memory)[0] > 0.0).any()
         moved = np.linalg.norm(self._relative(memory.position) - self._there, axis=1).max(initial=0.0)
-        if moved * self._mover.model.scales.length < 0.125 * self._reach and not left:
+        if moved * self._mover.model.scales.length < 0.125 * self._room and not left:
             return False
         known, found = {near.key for near in self.system.model.mesh.approaches}, self._searched(memory).keys()
         return found != known if left else not found <= known
@@ -248,9 +268,10 @@ class Approaching:
             if idle.any():
                 share = self._located(there, idle, low, high)
                 return min(max(share, SHORTEST / taken.h), 1.0), False
-            passed = (beside * now < 0.0).any(axis=1)
-            if passed.any() and (share := self._passing(taken, passed, beside, low, high)) is not None:
-                return share, False
+            passed = np.asarray(beside * now < 0.0).any(axis=1)
+            swept = self._passing(taken, np.flatnonzero(passed), beside, low, high) if passed.any() else None
+            if swept is not None:
+                return swept, False
             beside = now
         return None, False
 
@@ -262,7 +283,7 @@ class Approaching:
             low, high = (low, share) if left else (share, high)
         return high
 
-    def _passing(self, taken: Taken, rows: Array, beside: Array, low: float, high: float) -> float | None:
+    def _passing(self, taken: Taken, rows: Index, beside: Array, low: float, high: float) -> float | None:
         """Share of a step at which members are nearest between ends beside which some rows are, before and after it.
 
         None where there is none: what turns through the parallel in a plane is nearest at one end, then at the other.

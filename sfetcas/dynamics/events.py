@@ -81,6 +81,8 @@ class Soon:
 
     Attributes
     ----------
+    h : float
+        Its length.
     forces, opened : ndarray (rows,)
         Forces of the rows just after its begin, and openings at its end.
     rounding : float
@@ -93,6 +95,7 @@ class Soon:
         Speeds at its end of what slides, in the direction of sliding; infinite of others.
     """
 
+    h: float
     forces: Array
     opened: Array
     rounding: float
@@ -548,7 +551,7 @@ class Events:
         if self._rocks and memory.rubs is None:
             # Of many choices the one for accelerations is right, or nearly so.
             idle = self._soon(replace(memory, acting=np.zeros(len(acting))), h)
-            acting = self._impacts.at(memory).pressing(touching, 2.0 * idle.opened / h**2)
+            acting = self._impacts.at(memory).pressing(touching, 2.0 * idle.opened / idle.h**2)
         best, least = acting, len(acting) + 1
         while h > SHORTEST:
             tried: set[bytes] = set()
@@ -630,9 +633,13 @@ class Events:
         return min(h, max(SHARE * h, LEAST))
 
     def _soon(self, memory: Memory, h: float) -> Soon:
-        """What a short step from a state says."""
+        """What a short step from a state says; one that is so short that Newton's method converges."""
         short = self.stepper.starter
-        taken = short.step(replace(memory, last=None, rates=memory.rates[: short.method.kept]), h)
+        fresh = replace(memory, last=None, rates=memory.rates[: short.method.kept])
+        taken = short.step(fresh, h)
+        while not taken.converged and h > SHORTEST:
+            h *= SHORTER
+            taken = short.step(fresh, h)
         if not taken.converged:
             seconds = memory.t * self.stepper.time
             raise SolveError(Status.STOPPED, f"Newton's method did not converge at {seconds:.6g} s", memory)
@@ -641,7 +648,7 @@ class Events:
         most = float(np.abs(forces * memory.acting).max(initial=0.0))
         rounding = float(np.finfo(float).eps) * ROUNDED / h**2 + RELATIVE * most
         spare, friction = self._spare(memory, lam)
-        return Soon(forces, self._openings(taken.after), rounding, friction, spare, self._speeds(taken.after))
+        return Soon(h, forces, self._openings(taken.after), rounding, friction, spare, self._speeds(taken.after))
 
     def _openings(self, memory: Memory) -> Array:
         return self._opened(memory.q, memory.y, memory.t, memory) + self._offset

@@ -25,6 +25,7 @@ from ..mechanics.balance import three
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
 from ..mechanics.memory import Remembering
+from ..mechanics.mesh import Approach
 from ..mechanics.model import Model, assemble
 from ..mechanics.unilateral import UnilateralRows
 from ..solvers.redundancy import loose_rows
@@ -65,7 +66,8 @@ class Mover:
         impulse = event.impulse * (scales.moment if turns else scales.force) * self.time
         where = part.where
         lost, spot = event.lost * scales.moment, part.spot
-        return StopEvent(event.t * self.time, where, side, event.acts, impulse, lost, turns, spot.where if spot else "")
+        told = turns, spot.where if spot else "", isinstance(spot, Approach)
+        return StopEvent(event.t * self.time, where, side, event.acts, impulse, lost, *told)
 
     def instant(self, sample: Sample) -> MotionState:
         """The state by name of a dimensionless sample; multipliers balance all forces in least squares."""
@@ -307,7 +309,10 @@ class StopEvent:
     turns : bool
         Whether it is a stop of an angle.
     where : str
-        What touches the obstacle: ``nodes.tip``, or ``members.rod at 0.25``; else empty.
+        What touches the obstacle: ``nodes.tip``, or ``members.rod at 0.25``; members that touch each other:
+        ``members.rod and members.post``; else empty.
+    between_members : bool
+        Whether members touch each other.
     """
 
     time: float
@@ -318,6 +323,7 @@ class StopEvent:
     dissipated: float
     turns: bool = False
     where: str = ""
+    between_members: bool = False
 
     def __str__(self) -> str:
         when, unit = f"at {self.time:.9g} s {self.name}", "N m s" if self.turns else "N s"
@@ -325,7 +331,7 @@ class StopEvent:
         if self.side == "taut":
             what = "taut" if self.acts else "slack"
         elif self.where:
-            touches, hits, leaves = BETWEEN if " and members." in self.where else ALONE
+            touches, hits, leaves = BETWEEN if self.between_members else ALONE
             sticks = self.side == "sticking"
             what = f"{self.where} {touches if self.acts else hits if self.impulse else leaves}"
             what = f"{self.where} {'sticks' if self.acts else 'slides'}" if sticks else what

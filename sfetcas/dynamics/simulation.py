@@ -464,7 +464,7 @@ class Simulation:
         total = kinetic + elastic + loads + np.array([instant.sample.lost for instant in run.instants])
         most = float(kinetic.max() + np.ptp(elastic) + np.ptp(loads))
         changed = float(np.abs(total - total[0]).max())
-        if _keeps_energy(run.instants[0].model) and changed > LOST * most > 0.0:
+        if _keeps_energy(run.instants[0].model) and changed > LOST * most and most > RESTS:
             share = f"{100.0 * changed / most:.0f} % of what moves"
             return (f"nothing here gives or takes energy, but the total changes by {share}: the step is long for it",)
         return ()
@@ -519,6 +519,10 @@ DRIFTED = 1e-11
 
 LOST = 0.05
 """Share of what moves that a total energy may change by without a note: Radau's methods damp waves by some percent."""
+
+
+RESTS = 1e-11
+"""Energy, dimensionless, that is none: what is closed is so to 1e-12 of the unit of length, under forces near one."""
 
 
 class _Beginning:
