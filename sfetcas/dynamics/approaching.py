@@ -134,7 +134,7 @@ class Approaching:
         self._there = self._relative(memory.position)
         fields, found = self._fields(memory), dict[object, Approach]()
         all_found = self.closest.found(fields, self._wide, self._between)
-        free = min(map(self._free, all_found), default=np.inf)
+        free = min((near.gap for near in all_found), default=np.inf)
         self._room = max(min(self._wide, free), self._reach)
         self._wide = self._reach if free <= self._reach else max(min(WIDER * self._room, self._scene.size), self._reach)
         for near in all_found:
@@ -147,14 +147,6 @@ class Approaching:
                 if approach is not None:
                     found.setdefault(approach.key, approach)
         return found
-
-    def _free(self, near: Near) -> float:
-        """How far members that are near to each other somewhere may be from touching without a row, m."""
-        if near.gap >= self._reach:
-            return near.gap
-        rigid = all(self._scene.members[member].type == "rigid" for member in near.members)
-        # Lines that are straight are nearest at one place, which is followed.
-        return min(self.closest.lengths[member] for member in near.members) if rigid else self._reach
 
     def _ends(self, fields: Fields, pair: Pair) -> Iterator[Near]:
         """Ends of either member that are near to the other one."""
