@@ -79,7 +79,7 @@ class Near:
     at : tuple of float
         Fractions of their lengths.
     normal : ndarray (3,)
-        Unit vector from the second centre line, or the obstacle, to the first.
+        Unit vector from the second centre line, or the obstacle, to the first, as an obstacle that moves sees it.
     gap : float
         Distance of the surfaces, m; below zero where they penetrate.
     distance : float
@@ -112,6 +112,7 @@ class Pair:
     width : float
         Length along the members within which minima are one, over ``SAME``, m.
     stop : Obstacle or None
+        It is where it is in the undeformed scene: of one that moves what touches it is seen from it.
     ends : (bool, bool)
         Whether an obstacle can push the ends of the member.
     """
@@ -127,6 +128,11 @@ class Pair:
     def key(self) -> PairKey:
         """Its name."""
         return self.contact, self.members
+
+    @property
+    def moves(self) -> bool:
+        """Whether a node carries the obstacle."""
+        return self.stop is not None and self.stop.carrier is not None
 
     @property
     def passable(self) -> bool:
@@ -290,8 +296,9 @@ class Closest:
         """
         (member,), stop = pair.members, pair.stop
         assert stop is not None
-        tangent, bent = fields.slopes(member, x), self._curvature(fields, member, x)
-        out = (fields.positions(member, x) - stop.place) @ stop.across
+        places, tangent = fields.seen(pair.contact, fields.positions(member, x), fields.slopes(member, x))
+        _, bent = fields.seen(pair.contact, places, self._curvature(fields, member, x))
+        out = (places - stop.place) @ stop.across
         normals = stop.normals(out + stop.place, tangent)
         slope = np.einsum("ni,ni->n", normals, tangent)
         curvature = np.einsum("ni,ni->n", normals, bent)
@@ -386,10 +393,10 @@ class Closest:
 
     def along(self, fields: Fields, pair: Pair, mesh: Mesh, reach: float) -> list[Near]:
         """Of the ends of elements of the first member of a pair on some mesh those at which the second one is nearer
-        than ``reach``, m, as of :meth:`beside`; gaps from obstacles are the means of lines.
+        than ``reach``, m, as of :meth:`beside`; gaps from obstacles that stay are the means of lines.
         """
         cuts = mesh.cuts[pair.members[0]]
-        if pair.stop is None:
+        if pair.stop is None or pair.moves:
             return self.beside(fields, pair, cuts, reach)
         normals = self._gaps(fields, pair, cuts)[1]
         points = [ContactPoint(*pair.key, (x,), (False,), pair.distance, line=True) for x in cuts.tolist()]
@@ -592,7 +599,8 @@ def _entry(fields: Fields, point: ContactPoint) -> dict[str, Any]:
         gap = float(np.linalg.norm(places[0] - places[1])) - point.distance
         return {**entry, "gap": gap, "other": point.members[1], "other_at": told["at"][1]}
     stop = fields.model.scene.obstacles[point.contact]
-    gap = stop.gaps(places[0][None], fields.tangents(point.members[0], np.array(told["at"])))[0]
+    seen = fields.seen(point.contact, places[0][None], fields.tangents(point.members[0], np.array(told["at"])))
+    gap = stop.gaps(*seen)[0]
     return {**entry, "gap": float(gap) - fields.model.scene.contacts[point.contact].member_radius}
 
 

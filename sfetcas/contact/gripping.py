@@ -39,7 +39,7 @@ numbers leads to a state.
 
 
 class Placed:
-    """Where points are in a state: all of a member at once.
+    """Where points are in a state: all of a member at once; on an obstacle that moves as it sees them.
 
     Attributes
     ----------
@@ -57,8 +57,9 @@ class Placed:
             chosen = [(i, side) for i, side in sides if points[i].members[side] == member]
             at = np.array([points[i].at[side] for i, side in chosen])
             found = zip(chosen, fields.positions(member, at), fields.tangents(member, at), strict=True)
-            for (i, side), place, tangent in found:
-                self.places[i][side], self.tangents[i][side] = place, tangent
+            for (i, side), *here in found:
+                seen = fields.seen(points[i].contact, *(part[None] for part in here))
+                self.places[i][side], self.tangents[i][side] = (part[0] for part in seen)
         self.vectors = [
             here[0] - (here[1] if len(here) == 2 else scene.obstacles[point.contact].place)
             for here, point in zip(self.places, points, strict=True)

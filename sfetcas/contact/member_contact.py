@@ -341,7 +341,9 @@ class MemberContact:
         placed = Placed(self.scene, source.fields, target.mesh.points)
         begin = undeformed_vectors(self.scene, target.mesh.points)
         for i, point in enumerate(target.mesh.points):
-            change = (placed.vectors[i] - begin[i])[:axes] / unit
+            moved = source.fields.motion_of(point.contact)
+            now_apart = placed.vectors[i] if moved is None else moved[0] @ placed.vectors[i]
+            change = (now_apart - begin[i])[:axes] / unit
             if point.line:
                 # Nothing has slipped yet.
                 change = np.array(point.grip.origin)[:axes] / unit if point.grip else np.zeros(1)
@@ -516,8 +518,11 @@ class MemberContact:
         moved = 0.0
         for member in {member for pair in pairs for member in pair.members}:
             x = self.closest.samples(after, member)
-            apart = after.positions(member, x) - before.positions(member, x)
-            moved = max(moved, float(np.linalg.norm(apart, axis=1).max()))
+            places = after.positions(member, x), before.positions(member, x)
+            seen = {pair.contact for pair in pairs if member in pair.members}
+            for contact in seen:
+                one, other = (f.seen(contact, p, p)[0] for f, p in zip((after, before), places, strict=True))
+                moved = max(moved, float(np.linalg.norm(one - other, axis=1).max()))
         found = self.closest.found(before, 2.0 * moved, pairs)
         vectors = Placed(self.scene, after, found).vectors
         return [near for near, vector in zip(found, vectors, strict=True) if near.normal @ vector <= 0.0]

@@ -20,10 +20,10 @@ __all__ = ["Contact", "contact_radius", "pairs_of"]
 _KEYS = {
     "point": ({"position", "side"}, set()),
     "line": ({"point", "direction", "side"}, set()),
-    "plane": ({"point", "normal"}, {"side", "member_radius"}),
-    "circle": ({"center", "radius"}, {"side", "member_radius"}),
-    "cylinder": ({"center", "radius"}, {"side", "axis", "member_radius"}),
-    "sphere": ({"center", "radius"}, {"side", "member_radius"}),
+    "plane": ({"point", "normal"}, {"side", "member_radius", "node"}),
+    "circle": ({"center", "radius"}, {"side", "member_radius", "node"}),
+    "cylinder": ({"center", "radius"}, {"side", "axis", "member_radius", "node"}),
+    "sphere": ({"center", "radius"}, {"side", "member_radius", "node"}),
     "members": (set(), {"radius"}),
 }
 """Of each type the keys that it needs, and those that it may have."""
@@ -75,6 +75,9 @@ class Contact(Record):
         Of a circle, cylinder or sphere; of ``members`` that of their surfaces, by default that of their shape.
     axis : (3,)
         Of a cylinder.
+    node : name
+        Of a plane, circle, cylinder or sphere: the node that carries it.  Its place and directions are those in the
+        undeformed scene; it moves and turns with the node, on which what it pushes acts back.  By default it stays.
     member : name
         Name of the member that the obstacle stops, or that touches itself.
     members : list of names
@@ -99,6 +102,7 @@ class Contact(Record):
     center: Vector | None = None
     radius: Positive | None = None
     axis: Direction = (0.0, 0.0, 1.0)
+    node: str | None = None
     member: str | None = None
     members: Annotated[tuple[str, ...] | Literal["all"], BeforeValidator(_members)] | None = None
     side: Annotated[Direction | Literal["inside", "outside"], BeforeValidator(_side)] | None = None

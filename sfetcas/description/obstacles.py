@@ -7,7 +7,7 @@ space: a member slides over it, and the normal is that of the member).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -52,6 +52,8 @@ class Obstacle:
         1, or -1 where members are inside.
     side : ndarray (3,)
         For an edge: direction towards the permitted side.
+    carrier : str or None
+        Node with which it moves and turns; all else is said of the undeformed scene then.
     """
 
     kind: Literal["flat", "round", "sharp"]
@@ -61,6 +63,7 @@ class Obstacle:
     radius: float = 0.0
     sign: float = 1.0
     side: Array | None = None
+    carrier: str | None = None
 
     def gaps(self, points: Array, tangents: Array, offset: float = 0.0, way: float = 1.0) -> Array:
         """Distances (n,), m, of points (n, 3) of a member, negative inside; of an edge along the member's normal."""
@@ -81,6 +84,11 @@ class Obstacle:
             return self.sign * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), TINY)
         normals = way * np.cross(self.normal, tangents)
         return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY))
+
+    def moved(self, turned: Array, shift: Array) -> Obstacle:
+        """The obstacle rotated by a matrix (3, 3) about the origin, and then shifted by a vector (3,), m."""
+        across = turned @ self.across @ turned.T
+        return replace(self, place=turned @ self.place + shift, across=across, normal=turned @ self.normal)
 
     def curvature(self, point: Array, tangent: Array) -> float:
         """Signed curvature of the section of the obstacle in the plane, 1/m: counter-clockwise along the tangent."""
@@ -104,7 +112,7 @@ def obstacle(contact: Contact, space: bool) -> Obstacle:
         side = None if contact.side is None else np.asarray(contact.side, dtype=float)
         normal = unit(contact.normal) if contact.type == "plane" else np.cross([0, 0, 1.0], unit(contact.direction))
         normal = -normal if side is not None and side @ normal < 0.0 else normal
-        return Obstacle("flat", np.asarray(contact.point), np.outer(normal, normal), normal)
+        return Obstacle("flat", np.asarray(contact.point), np.outer(normal, normal), normal, carrier=contact.node)
     if contact.type in ("point", "line"):
         point = contact.position if contact.type == "point" else contact.point
         edge = eye[2] if contact.type == "point" else unit(contact.direction)
@@ -114,7 +122,7 @@ def obstacle(contact: Contact, space: bool) -> Obstacle:
     across = eye if contact.type == "sphere" else eye - np.outer(axis, axis)
     sign = -1.0 if contact.side == "inside" else 1.0
     place = np.asarray(contact.center, dtype=float)
-    return Obstacle("round", place, across, np.zeros(3), float(contact.radius or 0.0), sign)
+    return Obstacle("round", place, across, np.zeros(3), float(contact.radius or 0.0), sign, carrier=contact.node)
 
 
 def members_of(contact: Contact, members: Iterable[str]) -> list[str]:
@@ -125,11 +133,19 @@ def members_of(contact: Contact, members: Iterable[str]) -> list[str]:
 
 
 def takes_part(name: str, node: Node, motions: Iterable[Motion], stop: Obstacle) -> bool:
-    """Whether an obstacle can push a node: it is free, or its guide leads towards the obstacle and is not driven."""
+    """Whether an obstacle can push a node: it is free, or its guide leads towards the obstacle and is not driven.
+
+    The node that carries the obstacle moves with it.
+    """
+    if name == stop.carrier:
+        return False
     if node.support == "free":
         return True
     if not node.slides or any(m.node == name and m.displacement is not None for m in motions):
         return False
+    if stop.carrier is not None:
+        # What turns may come to push along the guide.
+        return True
     guide = np.asarray(node.direction, dtype=float)
     towards = stop.normal if stop.kind == "flat" else guide @ stop.across
     return bool(abs(guide @ towards) > tolerances.PARALLEL * np.linalg.norm(guide))

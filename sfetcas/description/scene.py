@@ -271,6 +271,11 @@ class Scene(Record):
         stops = {name: obstacle(one, space) for name, one in self.contacts.items() if not one.between_members}
         return MappingProxyType(stops)
 
+    @property
+    def carriers(self) -> frozenset[str]:
+        """Names of the nodes that carry obstacles."""
+        return frozenset(contact.node for contact in self.contacts.values() if contact.node is not None)
+
     @cached_property
     def tendon_pieces(self) -> Mapping[str, tuple[Piece, ...]]:
         """The straight pieces and the stretches along members of the way of each tendon, by name."""
@@ -309,7 +314,8 @@ class Scene(Record):
     def touches_at_points(self) -> bool:
         """Whether it is an unknown where members touch, see :mod:`sfetcas.mechanics.contact_points`.
 
-        They touch each other, have a radius on obstacles, or laws that touches as conditions of elements do not know.
+        They touch each other, have a radius on obstacles, or laws that touches as conditions of elements do not know, or
+        obstacles move.
         """
         return any(_why_points(self, name) for name in self.contacts)
 
@@ -508,10 +514,13 @@ def _check_members(scene: Scene) -> None:
         _known(ring.member, scene.members, "members", "rings", name, "member")
     used = {node for member in scene.members.values() for node in member.nodes}
     used |= {ring.node for ring in scene.rings.values()}
+    for name, contact in scene.contacts.items():
+        _known(contact.node, scene.nodes, "nodes", "contacts", name, "node")
+    held = {name for name in scene.carriers if scene.nodes[name].support != "free"}
     for name in scene.nodes:
-        if name not in used:
-            message = "node without member, accepted: a node where at least one member ends, or of a ring"
-            raise SceneError(message, ("nodes", name))
+        if name not in used | held:
+            message = "node without member, accepted: a node where at least one member ends, of a ring, or with a"
+            raise SceneError(f"{message} support and an obstacle", ("nodes", name))
 
 
 def check_loaded(scene: Scene) -> None:
@@ -986,6 +995,8 @@ def _check_contacts(scene: Scene) -> None:
         if contact.between_members:
             _check_between_members(scene, name)
             continue
+        if contact.node is not None:
+            _check_carried(scene, name, contact.node)
         for member in members_of(contact, scene.members):
             if member in magnetised:
                 message = (
@@ -1013,6 +1024,18 @@ def _check_contacts(scene: Scene) -> None:
                 raise SceneError(f"member {member!r} {error}", ("contacts", name)) from None
 
 
+def _check_carried(scene: Scene, name: str, node: str) -> None:
+    """Refuse an obstacle on a node that cannot turn it, or that carries it along with all of a member that it stops."""
+    joint = scene.nodes[node].joint
+    if joint != "rigid":
+        message = f"node {node!r} has no rotation of its own that an obstacle turns with, as its joint is a {joint}"
+        raise SceneError(message, ("contacts", name, "node"))
+    for member in members_of(scene.contacts[name], scene.members):
+        if scene.members[member].type == "rigid" and node in scene.members[member].nodes:
+            message = f"found {node!r}, an end of the rigid member {member!r}, which moves with the obstacle, accepted:"
+            raise SceneError(f"{message} a node of another member", ("contacts", name, "node"))
+
+
 def _check_points(scene: Scene) -> None:
     """Refuse what is not solved together with contact whose places are unknowns."""
     if not scene.touches_at_points:
@@ -1022,7 +1045,8 @@ def _check_points(scene: Scene) -> None:
     where, found = ("contacts", name), f"found {what}"
     if scene.analysis.type != "static":
         message = f"{found} with analysis.type = {scene.analysis.type!r}"
-        accepted = "'static', where the order of steps is known, or 'dynamic'" if what == "friction" else "'static'"
+        known = {"friction": "'static', where the order of steps is known, or 'dynamic'", CARRIED: STEPPED}
+        accepted = known.get(what, "'static'")
         raise SceneError(f"{message}, accepted: with {accepted}", where)
     edges = [other for other, stop in scene.obstacles.items() if stop.kind == "sharp"]
     if edges:
@@ -1041,8 +1065,13 @@ def _why_points(scene: Scene, name: str) -> str:
         return "a radius of members on an obstacle"
     if contact.friction > 0.0 and scene.analysis.type != "dynamic":
         return "friction"
+    if contact.node is not None and scene.analysis.type != "dynamic":
+        return CARRIED
     members = (m for m in members_of(contact, scene.members) if _of_points(scene, contact, m))
     return next((f"an obstacle of {member!r}, which has a law or stretches" for member in members), "")
+
+
+CARRIED, STEPPED = "an obstacle that a node carries", "'static' or 'dynamic'"
 
 
 def _check_between_members(scene: Scene, name: str) -> None:

@@ -33,7 +33,9 @@ def refuse_lost_forces(answer: Equilibrium) -> None:
     if any(spring.type == "translational" and spring.to is None for spring in scene.springs.values()):
         return
     forces = [answer.reaction(name)[0] for name, node in scene.nodes.items() if node.support != "free"]
-    forces += [np.reshape(answer.contacts[name]["force"], (-1, 3)).sum(axis=0) for name in scene.obstacles]
+    # What a node carries that pushes members is a part of the structure.
+    fixed = [name for name, stop in scene.obstacles.items() if stop.carrier is None]
+    forces += [np.reshape(answer.contacts[name]["force"], (-1, 3)).sum(axis=0) for name in fixed]
     forces += [pull for name in scene.tendons for pull in _pulls_of_ground(answer, name)]
     forces.append(answer.fields.total_load)
     missing = np.sum(forces, axis=0)

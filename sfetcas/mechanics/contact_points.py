@@ -15,6 +15,9 @@ Elsewhere on an obstacle ``d`` begins at its place, a point of a plane, a centre
 
     n . d - radius_1      or      |d - (a . d) a| - (radius_1 + radius),      inside of it with the opposite sign.
 
+An obstacle that a node carries, at ``u_c`` and turned by ``R``, begins at the place to which that has brought it; its
+gap is that of ``R^T d``, the vector as the obstacle sees it, and so is all that friction is about.
+
 With friction the force on the first member is ``N n + T``, with ``N`` and the shares ``T_k`` of ``T`` along two
 directions across ``n`` as unknowns: the displacements of a place at which nothing else is, and the forces on this place
 are what they miss.  With the slip ``v``, how far places of the members that touch have moved along each other since the
@@ -65,15 +68,19 @@ class Meeting(GuidedTerm):
 class Apart(Term):
     """The share of the vector itself, and of the first nodes of the members, or of the ends of elements where it stays.
 
-    Places: the vector, these, the places on the members.
+    Places: the vector, these, that of the node which carries the obstacle, the places on the members.  Data: the place
+    of the obstacle seen from that node.
 
     Attributes
     ----------
     members : int
         Two, or one on an obstacle.
+    carried : bool
+        Whether a node carries the obstacle.
     """
 
     members: int = 2
+    carried: bool = False
 
     table: ClassVar[str] = "contacts"
     answers: ClassVar[Mapping[str, str]] = {
@@ -84,18 +91,28 @@ class Apart(Term):
     shares_row: ClassVar[bool] = True
 
     @property
+    def one_sided(self) -> bool:  # type: ignore[override]
+        """Whether it turns the node that carries the obstacle."""
+        return self.carried
+
+    @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """The places; no data."""
-        return 0, 1 + 2 * self.members, self.axes, 0, 0
+        """The places, and of an obstacle that is carried the rotation and data."""
+        return int(self.carried), 1 + 2 * self.members + self.carried, self.axes, self.axes * self.carried, 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """How far the vector has changed less what the starts of the members have moved."""
-        starts = [*u[1 : 1 + self.members], [ca.SX(0)] * self.axes][:2]
-        return [between - first + second for between, first, second in zip(u[0], *starts, strict=True)]
+        second = [ca.SX(0)] * self.axes
+        if self.members == 2:
+            second = u[2]
+        elif self.carried:
+            arm = self.turned_forth(q[0], ca.vertsplit(data))
+            second = [place + turned for place, turned in zip(u[2], arm, strict=True)]
+        return [between - first + other for between, first, other in zip(u[0], u[1], second, strict=True)]
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """How far the point has moved along the members, and the force (3,) on the first one."""
-        moved = [*(place[0] for place in u[1 + self.members :]), ca.SX(0)][:2]
+        moved = [*(place[0] for place in u[1 + self.members + self.carried :]), ca.SX(0)][:2]
         return [*moved, *ca.vertsplit(lam), *[ca.SX(0)] * (3 - self.axes)]
 
 
@@ -112,23 +129,39 @@ class Gap(Term):
         Whether it is measured across an axis, whose components are data before the others.
     inside : bool
         Whether it is that to something round which members are inside of: it and the distance count with a minus.
+    carried : bool
+        Whether a node carries what it is measured from, whose rotation then is its side.
     """
 
     directed: bool
     across: bool = False
     inside: bool = False
+    carried: bool = False
 
     table: ClassVar[str] = "contacts"
     answers: ClassVar[Mapping[str, str]] = {"push": "N"}
 
     @property
+    def one_sided(self) -> bool:  # type: ignore[override]
+        """Whether it turns the node that carries the obstacle."""
+        return self.carried
+
+    @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """One place, one row."""
-        return 0, 1, 1, self.axes * (1 + self.directed + self.across) + 1, 0
+        return int(self.carried), 1, 1, self.axes * (1 + self.directed + self.across) + 1, 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """The gap."""
-        return [self.gap(ca.vertcat(*u[0]), data)]
+        return [self.gap(self.seen(q, u[0], data), data)]
+
+    def seen(self, q: list[Side], u: Side, data: ca.SX) -> ca.SX:
+        """How far the vector has changed (axes,), as the obstacle sees it."""
+        moved = ca.vertcat(*u)
+        if not self.carried:
+            return moved
+        begin = data[self.sizes[3] - 1 - self.axes : self.sizes[3] - 1]
+        return moved + ca.vertcat(*self.turned_back(q[0], ca.vertsplit(begin + moved)))
 
     def gap(self, moved: ca.SX, data: ca.SX) -> ca.SX:
         """The gap where the vector has changed by some displacement (axes,)."""
@@ -178,18 +211,28 @@ class RoughGap(Term):
         return False
 
     @property
+    def one_sided(self) -> bool:  # type: ignore[override]
+        """Whether it turns the node that carries the obstacle."""
+        return self.smooth.carried
+
+    @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """Its places; no rows."""
-        return 0, 2 + self.members, 0, self.smooth.sizes[3] + 3 + self.axes * (self.axes + 2 * self.members), 0
+        data = self.smooth.sizes[3] + 3 + self.axes * (self.axes + 2 * self.members)
+        return self.smooth.sizes[0], 2 + self.members, 0, data, 0
 
-    def _parts(self, u: list[Side], data: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, list[ca.SX]]:
-        """The gap, its normal, friction (axes,), the slip (axes,), and the tangents of the members."""
+    def _parts(
+        self, q: list[Side], u: list[Side], data: ca.SX
+    ) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, list[ca.SX]]:
+        """The gap, its normal, friction (axes,), the slip (axes,), and the tangents of the members, all as seen from
+        the obstacle.
+        """
         n, own = self.axes, data[self.smooth.sizes[3] + 3 :]
         vectors = ca.vertsplit(own, n)
         frame, origin, tangents = vectors[: n - 1], vectors[n - 1], vectors[n:]
         vector = ca.SX.sym("vector", n)
         gap = self.smooth.gap(vector, data[: self.smooth.sizes[3]])
-        moved = ca.vertcat(*u[0])
+        moved = self.smooth.seen(q, u[0], data[: self.smooth.sizes[3]])
         gap, normal = (ca.substitute(one, vector, moved) for one in (gap, ca.gradient(gap, vector)))
         force = sum((share * way for share, way in zip(u[1][1:], frame, strict=True)), start=ca.SX.zeros(n))
         slip = moved - origin
@@ -200,7 +243,7 @@ class RoughGap(Term):
 
     def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """On the vector minus the force of the point; on the forces what they miss; along the members."""
-        gap, normal, friction, slip, tangents = self._parts(u, data)
+        gap, normal, friction, slip, tangents = self._parts(q, u, data)
         first, n = self.smooth.sizes[3], self.axes
         coefficient, firm, yields = ca.vertsplit(data[first : first + 3])
         frame = ca.vertsplit(data[first + 3 :], n)[: n - 1]
@@ -216,13 +259,24 @@ class RoughGap(Term):
         nothing = [ca.SX(0)] * (n - 1)
         pairs = zip(tangents, (1.0, -1.0), strict=False)
         slides = [part for tangent, sign in pairs for part in (sign * ca.dot(friction, tangent), *nothing)]
-        return [*ca.vertsplit(-u[1][0] * normal - friction), -gap - yields * u[1][0], *missing, *slides]
+        moments, force = self._on(q, u, data, u[1][0] * normal + friction)
+        return [*moments, *(-part for part in force), -gap - yields * u[1][0], *missing, *slides]
+
+    def _on(self, q: list[Side], u: list[Side], data: ca.SX, force: ca.SX) -> tuple[Side, Side]:
+        """What a force, as seen from the obstacle, takes from the rotation of its node, and the force (axes,)."""
+        if not self.smooth.carried:
+            return [], ca.vertsplit(force)
+        first = self.smooth.sizes[3]
+        turned = ca.vertcat(*self.forth(q[0], ca.vertsplit(force)))
+        arm = data[first - 1 - self.axes : first - 1] + ca.vertcat(*u[0])
+        moment = ca.cross(arm, turned) if self.space else arm[0] * turned[1] - arm[1] * turned[0]
+        return ca.vertsplit(moment), ca.vertsplit(turned)
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """The force across, friction (3,) on the first member, and how far that has slipped (3,)."""
-        _, _, friction, slip, _ = self._parts(u, data)
+        _, _, friction, slip, _ = self._parts(q, u, data)
         nothing = [ca.SX(0)] * (3 - self.axes)
-        return [u[1][0], *ca.vertsplit(friction), *nothing, *ca.vertsplit(slip), *nothing]
+        return [u[1][0], *self._on(q, u, data, friction)[1], *nothing, *ca.vertsplit(slip), *nothing]
 
 
 LEAST_YIELDING = 1e-13
@@ -261,8 +315,10 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
             segments.place(place_of_cut(parts.mesh, segments.ends, member, cut or 0))
             for member, cut in zip(point.members, stands, strict=True)
         ]
-        apart = Apart(space, len(point.members))
-        yield One(apart, point.name, "", np.zeros(0), (), (between, *starts, *slides), point.name)
+        turns, carriers, arm = _carrier(parts, point)
+        apart = Apart(space, len(point.members), bool(turns))
+        places = (between, *starts, *carriers, *slides)
+        yield One(apart, point.name, _node_of(parts, point), arm[:axes] / unit, turns, places, point.name)
         for side, member in enumerate(point.members):
             if stands[side] is not None:
                 continue
@@ -271,6 +327,23 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
         data = np.append(begin[:axes], point.distance) / unit
         data = np.concatenate([*(way[:axes] for way in ways), data])
         yield _held(parts, point, gap, data, begin, slides)
+
+
+def _node_of(parts: Parts, point: ContactPoint) -> str:
+    """The node that carries the obstacle of a point; empty where it stays."""
+    return parts.scene.contacts[point.contact].node or ""
+
+
+def _carrier(parts: Parts, point: ContactPoint) -> tuple[tuple[int, ...], tuple[int, ...], Array]:
+    """Rotation and place of the node that carries the obstacle of a point, and where this is seen from it, m; empty
+    where it stays.
+    """
+    node = _node_of(parts, point)
+    turn = parts.rotations.node_turn[node] if node else None
+    if turn is None:
+        return (), (), np.zeros(0)
+    arm = parts.scene.obstacles[point.contact].place - numbers(parts.scene.nodes[node].position)
+    return (turn,), (parts.segments.place(node),), arm
 
 
 def _of_line(parts: Parts, point: ContactPoint) -> Iterator[One]:
@@ -288,8 +361,9 @@ def _held(parts: Parts, point: ContactPoint, gap: Gap, data: Array, begin: Array
     """The term that holds the gap; with friction the one that finds the forces."""
     segments, unit, axes, grip = parts.segments, parts.scales.length, parts.element.axes, point.grip
     between = segments.place(point.between)
+    node, turns = _node_of(parts, point), _carrier(parts, point)[0]
     if grip is None:
-        return One(gap, point.name, "", numbers(data), (), (between,), f"{point.name}, gap")
+        return One(gap, point.name, node, numbers(data), turns, (between,), f"{point.name}, gap")
     size = max(load_size(parts.scene, unit) / parts.scales.moment, 1.0)
     yields = max(grip.yields / size, LEAST_YIELDING)
     origin = (np.array(grip.origin) - begin)[:axes] / unit
@@ -298,16 +372,17 @@ def _held(parts: Parts, point: ContactPoint, gap: Gap, data: Array, begin: Array
     data = np.concatenate([data, [grip.coefficient, grip.firm * size, yields], *frame, origin, *further])
     places = (between, segments.place(point.pressed), *slides)
     members = 0 if point.line else len(point.members)
-    return One(RoughGap(parts.element.space, gap, members), point.name, "", numbers(data), (), places)
+    return One(RoughGap(parts.element.space, gap, members), point.name, node, numbers(data), turns, places)
 
 
 def _gap(scene: Scene, point: ContactPoint, space: bool) -> tuple[Gap, list[Array]]:
     """The constraint of a point, and the directions that belong to its data."""
+    carried = scene.contacts[point.contact].node is not None
     if point.normal is not None:
-        return Gap(space, True), [np.array(point.normal)]
+        return Gap(space, True, carried=carried), [np.array(point.normal)]
     if len(point.members) == 2:
         return Gap(space, False), []
     stop = scene.obstacles[point.contact]
     axis = np.linalg.svd(stop.across)[2][2]
     across = space and float(np.trace(stop.across)) < 2.5
-    return Gap(space, False, across, stop.sign < 0.0), [axis] if across else []
+    return Gap(space, False, across, stop.sign < 0.0, carried), [axis] if across else []

@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import tolerances
 from ..description.answers import single_number
+from ..description.obstacles import Obstacle
 from ..description.records import enumerated
 from ..description.tendons import Stretch
 from ..errors import SolveError, Status
@@ -122,6 +123,27 @@ class Fields:
         """Quaternion (4,) or, in the plane, angle (1,) of a node since the undeformed scene; None if it has none."""
         number = self.model.rotations.node_turn[node]
         return None if number is None else self.state.q[number]
+
+    def motion_of(self, contact: str) -> tuple[Array, Array] | None:
+        """How an obstacle has moved since the undeformed scene: the matrix (3, 3) of its rotation, and the place (3,) m
+        to which that would turn the origin; None where it stays.
+        """
+        node = self.model.scene.contacts[contact].node
+        turn = None if node is None else self.rotation(node)
+        if node is None or turn is None:
+            return None
+        turned = quaternion.matrix(turn if self.model.space else quaternion.from_rotation_vector([0.0, 0.0, turn[0]]))
+        return turned, self.position(node) - turned @ np.asarray(self.model.scene.nodes[node].position)
+
+    def seen(self, contact: str, points: Array, tangents: Array) -> tuple[Array, Array]:
+        """Points (n, 3), m, and vectors (n, 3) as an obstacle sees them that moves: as if it had not moved."""
+        moved = self.motion_of(contact)
+        return (points, tangents) if moved is None else ((points - moved[1]) @ moved[0], tangents @ moved[0])
+
+    def obstacle(self, contact: str) -> Obstacle:
+        """An obstacle where it is."""
+        stop, moved = self.model.scene.obstacles[contact], self.motion_of(contact)
+        return stop if moved is None else stop.moved(*moved)
 
     def reaction(self, node: str) -> tuple[Array, Array]:
         """Force (3,) N and moment about the node (3,) N m that the ground exerts on a supported node."""

@@ -151,7 +151,8 @@ class ContactPoint:
     number : int
         Distinguishes the points of one record.
     normal : vector, optional
-        Direction along which the distance is measured: that of a plane; of what is new.
+        Direction along which the distance is measured: that of a plane; of what is new.  Of an obstacle that a node
+        carries all directions and vectors of a point turn with it: they are those of the undeformed scene.
     new : bool
         Whether it is not yet known how hard it pushes: where it is is no unknown, and the normal is a given one.
     grip : Grip, optional

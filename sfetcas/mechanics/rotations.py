@@ -97,7 +97,8 @@ def number_rotations(scene: Scene, mesh: Mesh, element: Element) -> Rotations:
             chain = [first, *inner, ends[name][-1]]
             turns += [chain[e : e + element.order + 1] for e in range(0, len(chain) - 1, element.order)]
     for name, node in scene.nodes.items():
-        if node.joint == "rigid" and numbering.freedom[name] != RotationFreedom.FREE:
+        held = numbering.freedom[name] != RotationFreedom.FREE
+        if node.joint == "rigid" and (held or name in scene.carriers):
             numbering.of(("node", name))
     return Rotations(
         turns=np.array(turns, dtype=np.intp).reshape(-1, element.order + 1),

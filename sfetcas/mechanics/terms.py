@@ -281,6 +281,10 @@ class Term(Components, abc.ABC):
         c, s = ca.cos(q[0]), ca.sin(q[0])
         return [c * v[0] - s * v[1], s * v[0] + c * v[1]]
 
+    def turned_forth(self, q: Side, v: Side) -> Side:
+        """``R(q) v - v``, to full relative precision also for small rotations."""
+        return self.turned_back([q[0], *(-a for a in q[1:])] if self.space else [-q[0]], v)
+
     def relative(self, a: Side, b: Side) -> Side:
         """Rotation of side b relative to side a, in undeformed axes: ``conj(a) b``, in the plane the difference."""
         return product([a[0], -a[1], -a[2], -a[3]], b) if self.space else [b[0] - a[0]]
