@@ -130,11 +130,6 @@ class Pair:
         return self.contact, self.members
 
     @property
-    def moves(self) -> bool:
-        """Whether a node carries the obstacle."""
-        return self.stop is not None and self.stop.carrier is not None
-
-    @property
     def passable(self) -> bool:
         """Whether members may have passed each other or the obstacle: what is beyond a plane is inside of it."""
         return self.stop is None or (self.stop.kind == "round" and self.stop.sign > 0.0)
@@ -393,10 +388,10 @@ class Closest:
 
     def along(self, fields: Fields, pair: Pair, mesh: Mesh, reach: float) -> list[Near]:
         """Of the ends of elements of the first member of a pair on some mesh those at which the second one is nearer
-        than ``reach``, m, as of :meth:`beside`; gaps from obstacles that stay are the means of lines.
+        than ``reach``, m, as of :meth:`beside`; gaps from obstacles are the means of lines.
         """
         cuts = mesh.cuts[pair.members[0]]
-        if pair.stop is None or pair.moves:
+        if pair.stop is None:
             return self.beside(fields, pair, cuts, reach)
         normals = self._gaps(fields, pair, cuts)[1]
         points = [ContactPoint(*pair.key, (x,), (False,), pair.distance, line=True) for x in cuts.tolist()]

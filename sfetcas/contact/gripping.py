@@ -143,12 +143,13 @@ class Gripping:
         if point.grip is None:
             return point
         (member,), (x, share) = point.members, stations_of_line(mesh, point)
-        normals, tangents = self._normals(fields, point, x), fields.tangents(member, x)
+        normals, tangents = self._along(fields, point, x)
         ways = [unit(tangents - np.einsum("ni,ni->n", tangents, normals)[:, None] * normals)]
         if fields.model.space:
             ways.append(np.cross(normals, ways[0]))
         since = fields if self.since is None else self.since
-        moved = since.positions(member, x) - self.scene.center_lines[member].positions(x) + point.grip.touched
+        places, _ = since.seen(point.contact, since.positions(member, x), tangents)
+        moved = places - self.scene.center_lines[member].positions(x) + point.grip.touched
         means = [float(share @ np.einsum("ni,ni->n", way, moved)) for way in ways]
         origin = three(np.array([0.0, *means]))
         frame = tuple(_told(np.eye(3)[i + 1]) for i in range(len(ways)))
@@ -156,11 +157,14 @@ class Gripping:
         grip = replace(point.grip, frame=frame, origin=_told(origin), before=(), now=(), along=along)
         return replace(point, grip=grip)
 
-    def _normals(self, fields: Fields, point: ContactPoint, x: Array) -> Array:
-        """Unit normals (n, 3) of an obstacle at fractions x (n,) of the length of a member on it."""
-        stop = self.closest.pairs[point.pair].stop
+    def _along(self, fields: Fields, point: ContactPoint, x: Array) -> tuple[Array, Array]:
+        """Unit normals (n, 3) of an obstacle at fractions x (n,) of the length of a member on it, and unit tangents
+        (n, 3), as the obstacle sees them.
+        """
+        stop, (member,) = self.closest.pairs[point.pair].stop, point.members
         assert stop is not None
-        return stop.normals(fields.positions(point.members[0], x), fields.tangents(point.members[0], x))
+        places, tangents = fields.seen(point.contact, fields.positions(member, x), fields.tangents(member, x))
+        return stop.normals(places, tangents), tangents
 
     def begins(self, points: Iterable[ContactPoint], limit: float) -> float | None:
         """Share of a step after which places begin to touch, the first of those that have moved before by more than a
@@ -190,7 +194,7 @@ class Gripping:
         return False
 
     def _off_line(self, fields: Fields, point: ContactPoint, grip: Grip) -> bool:
-        normals = self._normals(fields, point, stations_of_line(fields.model.mesh, point)[0])
+        normals, _ = self._along(fields, point, stations_of_line(fields.model.mesh, point)[0])
         ways = np.reshape(grip.along, (len(normals), -1, 3))
         return bool(np.abs(np.einsum("nki,ni->nk", ways, normals)).max() > CENTRED)
 

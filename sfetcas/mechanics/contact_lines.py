@@ -10,6 +10,7 @@ so that the multiplier of the first row is the force.  One force may also be spr
 the pressure is then linear along each element, but may jump between them.  With friction further components of ``d_i``
 are the means of how far places have moved along directions ``t`` across the normal, and their multipliers are the
 friction, also shared out.  The integrals are sums over the points at which elements are integrated.
+All this is seen from an obstacle that a node carries, as in :mod:`~sfetcas.mechanics.contact_points`.
 
 Source: mortar methods; Wriggers 2006, Computational Contact Mechanics, section 8.3.
 """
@@ -17,7 +18,7 @@ Source: mortar methods; Wriggers 2006, Computational Contact Mechanics, section 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, final
 
 import casadi as ca
@@ -30,7 +31,37 @@ from .parts import Parts
 from .segments import beside_line, place_of_cut, weights_towards
 from .terms import One, Side, Term
 
-__all__ = ["Mean", "Pressed", "pressed_along"]
+__all__ = ["Carrier", "Mean", "Pressed", "carrier_of", "pressed_along"]
+
+
+@dataclass(frozen=True, eq=False)
+class Carrier:
+    """The node that carries the obstacle of a point.
+
+    Attributes
+    ----------
+    node : str
+        Empty where the obstacle stays.
+    turns, places : tuple of int
+        Numbers of its rotation and its place.
+    arm : ndarray (3,)
+        Place of the obstacle in the undeformed scene, seen from the node, m.
+    """
+
+    node: str = ""
+    turns: tuple[int, ...] = ()
+    places: tuple[int, ...] = ()
+    arm: Array = field(default_factory=lambda: np.zeros(0))
+
+
+def carrier_of(parts: Parts, contact: str) -> Carrier:
+    """What carries the obstacle of a contact."""
+    node = parts.scene.contacts[contact].node
+    turn = None if node is None else parts.rotations.node_turn[node]
+    if node is None or turn is None:
+        return Carrier()
+    arm = parts.scene.obstacles[contact].place - numbers(parts.scene.nodes[node].position)
+    return Carrier(node, (turn,), (parts.segments.place(node),), arm)
 
 
 @final
@@ -64,9 +95,10 @@ class Mean(Term):
 class Pressed(Term):
     """The share of one element in the means of one of its ends.
 
-    Places: the strains of the element, its start.  Data: tangents and compliances of its points, their undeformed
-    places seen from the obstacle, what the gap is measured by, the share of the element, and with friction directions
-    across the normal, those of each point together.
+    Places: the strains of the element, its start, and that of the node which carries the obstacle, whose rotation is
+    the last.  Data: tangents and compliances of its points, their undeformed places seen from the obstacle, what the
+    gap is measured by, the share of the element, with friction directions across the normal, those of each point
+    together, and the place of the obstacle seen from its node.
 
     Attributes
     ----------
@@ -77,24 +109,32 @@ class Pressed(Term):
         Whether the weight rises from the start of the element to its end.
     rough : bool
         Whether there is friction.
+    carried : bool
+        Whether a node carries the obstacle.
     """
 
     element: Element
     gap: Term
     rising: bool
     rough: bool = False
+    carried: bool = False
 
     table: ClassVar[str] = "contacts"
     along_element: ClassVar[bool] = True
     shares_row: ClassVar[bool] = True
 
     @property
+    def one_sided(self) -> bool:  # type: ignore[override]
+        """Whether it turns the node that carries the obstacle."""
+        return self.carried
+
+    @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """The rotations of the element, its places; a row for each mean."""
         turns, strains, *_ = self.element.sizes
-        points, n = len(self.element.points), self.axes
+        points, n, more = len(self.element.points), self.axes, int(self.carried)
         data = self.element.line_data + points * n + self._ways + 1 + (points * n * (n - 1) if self.rough else 0)
-        return turns, strains + 1, n if self.rough else 1, data, 0
+        return turns + more, strains + 1 + more, n if self.rough else 1, data + n * more, 0
 
     @property
     def _ways(self) -> int:
@@ -110,14 +150,27 @@ class Pressed(Term):
         return {f"{kind} {axis} at {k} {side}": "N" for kind in kinds for k in points for axis in "xyz"}
 
     def _split(self, q: list[Side], u: list[Side], data: ca.SX) -> tuple[list[ca.SX], ca.SX, list[list[ca.SX]]]:
-        """How far points have moved (axes,), their places before, a column each, and directions of each."""
+        """How far points have moved (axes,), as the obstacle sees it, their places before, a column each, and
+        directions of each.
+        """
         element, n, points = self.element, self.axes, len(self.element.points)
+        turns, strains, *_ = element.sizes
         line, places, rest = ca.vertsplit(data, [0, element.line_data, element.line_data + points * n, data.shape[0]])
-        changed = ca.horzcat(*element.tangents(q, u[:-1], line)) - element.line(line)[0]
+        changed = ca.horzcat(*element.tangents(q[:turns], u[:strains], line)) - element.line(line)[0]
         moved = ca.mtimes(changed, ca.DM((element.to_points / element.weights).T))
         ways = ca.vertsplit(rest[self._ways + 1 :], n) if self.rough else []
         each = [ways[k * (n - 1) : (k + 1) * (n - 1)] for k in range(points)]
-        return [ca.vertcat(*u[-1]) + moved[:, k] for k in range(points)], ca.reshape(places, n, points), each
+        before = ca.reshape(places, n, points)
+        found = [ca.vertcat(*u[strains]) + moved[:, k] for k in range(points)]
+        return [self._seen(q, u, data, one, before[:, k]) for k, one in enumerate(found)], before, each
+
+    def _seen(self, q: list[Side], u: list[Side], data: ca.SX, moved: ca.SX, before: ca.SX) -> ca.SX:
+        """How far a point has moved that was at a place before, as the obstacle sees it."""
+        if not self.carried:
+            return moved
+        arm = ca.vertcat(*self.turned_forth(q[-1], ca.vertsplit(data[-self.axes :])))
+        moved = moved - ca.vertcat(*u[-1]) - arm
+        return moved + ca.vertcat(*self.turned_back(q[-1], ca.vertsplit(before + moved)))
 
     def _shares(self, data: ca.SX) -> list[ca.SX]:
         """Weights of the points."""
@@ -155,10 +208,14 @@ class Pressed(Term):
             friction = sum((lam[i + 1] * way for i, way in enumerate(ways[k])), start=ca.SX.zeros(n))
             along.append(share * friction)
         told = [*across, *(along if self.rough else [])]
+        if self.carried:
+            told = [ca.vertcat(*self.forth(q[-1], ca.vertsplit(force))) for force in told]
         return [part for force in told for part in (*ca.vertsplit(force), *[ca.SX(0)] * (3 - n))]
 
 
-def pressed_along(parts: Parts, point: ContactPoint, gap: Term, ways: list[Array], origin: Array) -> Iterator[One]:
+def pressed_along(
+    parts: Parts, point: ContactPoint, gap: Term, ways: list[Array], origin: Array, carrier: Carrier
+) -> Iterator[One]:
     """Terms of one end of elements on a line.
 
     Parameters
@@ -171,6 +228,8 @@ def pressed_along(parts: Parts, point: ContactPoint, gap: Term, ways: list[Array
         Directions that belong to the data of that.
     origin : ndarray (3,)
         Place of the obstacle, m.
+    carrier : Carrier
+        What carries it.
     """
     member, unit, axes, grip = point.members[0], parts.scales.length, parts.element.axes, point.grip
     yield One(
@@ -198,15 +257,16 @@ def pressed_along(parts: Parts, point: ContactPoint, gap: Term, ways: list[Array
             *(way[:axes] for way in ways),
             np.array([point.distance / unit, share]),
             own.ravel(),
+            carrier.arm[:axes] / unit,
         ]
         start = parts.segments.place(place_of_cut(parts.mesh, parts.segments.ends, member, element))
         yield One(
-            Pressed(parts.element.space, parts.element, gap, rising, grip is not None),
+            Pressed(parts.element.space, parts.element, gap, rising, grip is not None, bool(carrier.node)),
             point.name,
-            "",
+            carrier.node,
             numbers(np.concatenate(data)),
-            tuple(parts.rotations.turns[number].tolist()),
-            (*parts.segments.strains[number].tolist(), start),
+            (*parts.rotations.turns[number].tolist(), *carrier.turns),
+            (*parts.segments.strains[number].tolist(), start, *carrier.places),
             point.name,
             element=number,
         )

@@ -45,7 +45,7 @@ import numpy as np
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, numbers
 from .beams import load_size
-from .contact_lines import pressed_along
+from .contact_lines import Carrier, carrier_of, pressed_along
 from .mesh import ContactPoint
 from .parts import Parts
 from .rings import GuidedTerm, guided
@@ -315,10 +315,10 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
             segments.place(place_of_cut(parts.mesh, segments.ends, member, cut or 0))
             for member, cut in zip(point.members, stands, strict=True)
         ]
-        turns, carriers, arm = _carrier(parts, point)
-        apart = Apart(space, len(point.members), bool(turns))
-        places = (between, *starts, *carriers, *slides)
-        yield One(apart, point.name, _node_of(parts, point), arm[:axes] / unit, turns, places, point.name)
+        carrier = carrier_of(parts, point.contact)
+        apart = Apart(space, len(point.members), bool(carrier.node))
+        places = (between, *starts, *carrier.places, *slides)
+        yield One(apart, point.name, carrier.node, carrier.arm[:axes] / unit, carrier.turns, places, point.name)
         for side, member in enumerate(point.members):
             if stands[side] is not None:
                 continue
@@ -329,29 +329,14 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
         yield _held(parts, point, gap, data, begin, slides)
 
 
-def _node_of(parts: Parts, point: ContactPoint) -> str:
-    """The node that carries the obstacle of a point; empty where it stays."""
-    return parts.scene.contacts[point.contact].node or ""
-
-
-def _carrier(parts: Parts, point: ContactPoint) -> tuple[tuple[int, ...], tuple[int, ...], Array]:
-    """Rotation and place of the node that carries the obstacle of a point, and where this is seen from it, m; empty
-    where it stays.
-    """
-    node = _node_of(parts, point)
-    turn = parts.rotations.node_turn[node] if node else None
-    if turn is None:
-        return (), (), np.zeros(0)
-    arm = parts.scene.obstacles[point.contact].place - numbers(parts.scene.nodes[node].position)
-    return (turn,), (parts.segments.place(node),), arm
-
-
 def _of_line(parts: Parts, point: ContactPoint) -> Iterator[One]:
     """Terms of an end of elements on a line: the mean of the gap is a component along a normal."""
     stop, space = parts.scene.obstacles[point.contact], parts.element.space
     normal = tuple(stop.normal.tolist()) if stop.kind == "flat" else None
     gap, ways = _gap(parts.scene, replace(point, normal=normal), space)
-    yield from pressed_along(parts, point, gap, ways, stop.place)
+    # What is held, means, is not turned.
+    gap = replace(gap, carried=False)
+    yield from pressed_along(parts, point, gap, ways, stop.place, carrier_of(parts, point.contact))
     axes = parts.element.axes
     data = np.concatenate([np.eye(axes)[0], np.zeros(axes + 1)])
     yield _held(parts, point, Gap(space, True), data, np.zeros(3), [])
@@ -361,9 +346,10 @@ def _held(parts: Parts, point: ContactPoint, gap: Gap, data: Array, begin: Array
     """The term that holds the gap; with friction the one that finds the forces."""
     segments, unit, axes, grip = parts.segments, parts.scales.length, parts.element.axes, point.grip
     between = segments.place(point.between)
-    node, turns = _node_of(parts, point), _carrier(parts, point)[0]
+    carrier = carrier_of(parts, point.contact) if gap.carried else Carrier()
     if grip is None:
-        return One(gap, point.name, node, numbers(data), turns, (between,), f"{point.name}, gap")
+        place = (between,)
+        return One(gap, point.name, carrier.node, numbers(data), carrier.turns, place, f"{point.name}, gap")
     size = max(load_size(parts.scene, unit) / parts.scales.moment, 1.0)
     yields = max(grip.yields / size, LEAST_YIELDING)
     origin = (np.array(grip.origin) - begin)[:axes] / unit
@@ -372,7 +358,8 @@ def _held(parts: Parts, point: ContactPoint, gap: Gap, data: Array, begin: Array
     data = np.concatenate([data, [grip.coefficient, grip.firm * size, yields], *frame, origin, *further])
     places = (between, segments.place(point.pressed), *slides)
     members = 0 if point.line else len(point.members)
-    return One(RoughGap(parts.element.space, gap, members), point.name, node, numbers(data), turns, places)
+    rough = RoughGap(parts.element.space, gap, members)
+    return One(rough, point.name, carrier.node, numbers(data), carrier.turns, places)
 
 
 def _gap(scene: Scene, point: ContactPoint, space: bool) -> tuple[Gap, list[Array]]:

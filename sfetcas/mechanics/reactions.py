@@ -279,8 +279,12 @@ class Reactions:
         """Group, number and side of all that takes a moment at a node but members."""
         found: dict[str, list[tuple[int, int, int]]] = {}
         for number, group in enumerate(self.model.terms[1:], start=1):
-            own = group.kind.table == "members" or group.kind.along_element or group.kind.spans
+            own = group.kind.table == "members" or group.kind.spans
+            # Sides of what runs along an element are first the nodes of that.
+            first = self.model.element.order + 1 if group.kind.along_element else 0
             for i, side in np.argwhere(group.turns != GROUND).tolist() if not own else ():
+                if side < first:
+                    continue
                 node = self.model.segments.places[group.places[i, side]] if group.kind.apart else group.nodes[i]
                 found.setdefault(self._ending.get(node, node), []).append((number, i, side))
         return found
