@@ -170,7 +170,7 @@ class Touched:
     def push_at(self, spot: Spot) -> Array:
         """Force (3,) of an obstacle on a member at a place where it stops it in a motion, N."""
         place, tangent = (of(spot.member, np.array([spot.at])) for of in (self.fields.positions, self.fields.tangents))
-        normal = self.obstacles[spot.contact].normals(place, tangent)[0]
+        normal = self.fields.obstacle(spot.contact).normals(place, tangent)[0]
         return np.asarray(-self._state.lam[self._row[spot.name]] * normal * self.model.scales.force)
 
     def _resultant(self, touch: Touch) -> Array:

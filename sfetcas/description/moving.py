@@ -87,12 +87,24 @@ def check_contact(
             found = f"found with the integrator {analysis.integrator!r}, which does not find when it is touched"
             more = "" if contact.between_members else ", generalised-alpha"
             raise SceneError(f"{found}, accepted: radau-3, radau-2{more}", where)
+        if contact.node is not None:
+            _check_carried(analysis, contact, where)
         # Names of nothing are refused elsewhere.
         for member in (name for name in members_of(contact, members) if name in members):
             section = sections.get(str(members[member].section))
             if members[member].type == "flexible" and section is not None and not section.mass(HEAVY).all():
                 message = f"found the member {member!r}, whose section is without mass, so that it would have to jump"
                 raise SceneError(f"{message}, accepted: a small rhoA", where)
+
+
+def _check_carried(analysis: Analysis, contact: Contact, where: tuple[str, ...]) -> None:
+    """Refuse an obstacle that a node carries with what motions do not know of it."""
+    if contact.friction > 0.0:
+        message = "found of an obstacle that a node carries in a motion, accepted: with analysis.type = 'static', or 0"
+        raise SceneError(message, (*where, "friction"))
+    if analysis.initial == "equilibrium":
+        message = "found 'equilibrium' with an obstacle that a node carries, accepted: a motion that begins undeformed"
+        raise SceneError(message, ("analysis", "initial"))
 
 
 def _check_between(analysis: Analysis, name: str, contacts: Mapping[str, Contact]) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..contact.closest import Closest
 from ..contact.pressing import pressed
 from ..contact.touches import Touched
 from ..description.answers import MOTION
@@ -245,14 +246,14 @@ class MotionState(Configuration):
         model, scene = self.model, self.model.scene
         if not scene.contacts:
             return {}
-        touched, found = Touched.of(self.fields), dict[str, dict[str, Any]]()
+        closest, found = Closest(scene), dict[str, dict[str, Any]]()
         between = [name for name, one in scene.contacts.items() if one.between_members]
         found |= pressed(self.fields, between) if between else {}
         for name in scene.obstacles:
             force = sum((force for _, _, force in self.pushes(name)), np.zeros(3))
             spots = [spot for spot in model.mesh.spots or () if spot.contact == name]
             touching = [spot.where for spot in spots]
-            found[name] = {"force": force, "gap": touched.smallest_gap(name, {}), "touching": touching}
+            found[name] = {"force": force, "gap": closest.gap(self.fields, name), "touching": touching}
             if scene.contacts[name].friction:
                 rubbed = [(spot.where, *self.friction[spot.name]) for spot in spots if spot.name in self.friction]
                 found[name]["friction"] = sum((force for _, force, _ in rubbed), np.zeros(3))

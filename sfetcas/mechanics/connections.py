@@ -21,6 +21,7 @@ from .contact_joints import (
     Bent,
     CushionedPlane,
     CushionedRound,
+    Facing,
     OnEdge,
     OnPlane,
     OnRound,
@@ -287,8 +288,21 @@ class _Toucher:
         start = self.scene.center_lines[spot.member].positions(np.array([spot.at]))[0] - stop.place
         flat = stop.kind == "flat"
         data = self._flat(stop, start, 0.0) if flat else self._round(stop, start, 0.0)
-        kind = OnPlane(space) if flat else OnRound(space)
-        return One(kind, spot.contact, "", data, (), (self.segments.place(spot.place),), spot.name)
+        carried = stop.carrier is not None
+        kind = OnPlane(space, carried) if flat else OnRound(space, carried)
+        return self._facing(kind, spot, stop, data, spot.name)
+
+    def _facing(self, kind: Facing, spot: Spot, stop: Obstacle, data: Array, row: str) -> One:
+        """A constraint on a place of a member that an obstacle sees."""
+        places, axes, unit = (self.segments.place(spot.place),), self.element.axes, self.scales.length
+        turn = None if stop.carrier is None else self.rotations.node_turn[stop.carrier]
+        if stop.carrier is None or turn is None:
+            return One(kind, spot.contact, "", data, (), places, row)
+        start = self.scene.center_lines[spot.member].positions(np.array([spot.at]))[0] - stop.place
+        arm = stop.place - np.asarray(self.scene.nodes[stop.carrier].position)
+        data = np.concatenate([data, start[:axes] / unit, arm[:axes] / unit])
+        places = (*places, self.segments.place(stop.carrier))
+        return One(kind, spot.contact, stop.carrier, data, (turn,), places, row)
 
     def _sticking(self, spot: Spot) -> One:
         """A place that an obstacle holds along it: in the undeformed scene, or where a motion says."""
@@ -296,8 +310,7 @@ class _Toucher:
         stop = self.scene.obstacles[spot.contact]
         normal = stop.normals(line.positions(x), line.tangents(x))[0, :axes]
         data = np.append(directions_along(normal), np.zeros((axes - 1, 1)), axis=1).ravel()
-        place = (self.segments.place(spot.place),)
-        return One(Sticking(self.element.space), spot.contact, "", data, (), place, spot.along)
+        return self._facing(Sticking(self.element.space, stop.carrier is not None), spot, stop, data, spot.along)
 
     def _flat(self, stop: Obstacle, start: Array, offset: float) -> Array:
         """Data of a place on a plane; ``start`` is where it begins, from the obstacle's place, m."""

@@ -5,6 +5,7 @@ They are terms as joints are, see :mod:`~sfetcas.mechanics.joints`.  All data ar
 
 from __future__ import annotations
 
+import abc
 from dataclasses import dataclass
 from typing import ClassVar, final
 
@@ -20,6 +21,7 @@ __all__ = [
     "Bent",
     "CushionedPlane",
     "CushionedRound",
+    "Facing",
     "OnEdge",
     "OnPlane",
     "OnRound",
@@ -31,60 +33,125 @@ CENTRE = 1e-60
 """Added to the square of a distance, dimensionless: below rounding wherever the distance is not itself nothing."""
 
 
+@dataclass(frozen=True)
+class Facing(Term):
+    """Constraint on a place as an obstacle sees it.
+
+    Places: it, and the node that carries the obstacle, whose rotation is the side.  Data: those of the constraint; then
+    where the place and the obstacle are in the undeformed scene, seen from the obstacle and from its node.
+
+    Attributes
+    ----------
+    carried : bool
+        Whether a node carries the obstacle.
+    """
+
+    carried: bool = False
+
+    @property
+    def one_sided(self) -> bool:  # type: ignore[override]
+        """Whether it turns the node that carries the obstacle."""
+        return self.carried
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """The place, and what carries the obstacle."""
+        more = int(self.carried)
+        return more, 1 + more, self.rows, self.own + 2 * self.axes * more, 0
+
+    @property
+    @abc.abstractmethod
+    def rows(self) -> int:
+        """Number of its rows."""
+
+    @property
+    @abc.abstractmethod
+    def own(self) -> int:
+        """Number of the data of the constraint."""
+
+    @abc.abstractmethod
+    def missed(self, u: Side, data: ca.SX) -> list[ca.SX]:
+        """The rows for a displacement."""
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The rows."""
+        if not self.carried:
+            return self.missed(u[0], data)
+        n, begin, arm = self.axes, data[-2 * self.axes : -self.axes], data[-self.axes :]
+        turned = ca.vertcat(*self.turned_forth(q[0], ca.vertsplit(arm)))
+        moved = ca.vertcat(*u[0]) - ca.vertcat(*u[1]) - turned
+        seen = moved + ca.vertcat(*self.turned_back(q[0], ca.vertsplit(begin + moved)))
+        return self.missed(ca.vertsplit(seen), data[: data.shape[0] - 2 * n])
+
+
 @final
 @dataclass(frozen=True)
-class OnPlane(Term):
-    """Constraint: a place lies on a plane; data: unit normal, gap in the undeformed scene."""
+class OnPlane(Facing):
+    """A place lies on a plane; data: unit normal, gap in the undeformed scene."""
 
     on_face: ClassVar[bool] = True
 
     @property
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """One row."""
-        return 0, 1, 1, self.axes + 1, 0
+    def rows(self) -> int:
+        """One."""
+        return 1
 
-    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+    @property
+    def own(self) -> int:
+        """Normal and gap."""
+        return self.axes + 1
+
+    def missed(self, u: Side, data: ca.SX) -> list[ca.SX]:
         """The gap."""
-        return [_gap_of_plane(u[0], data)]
+        return [_gap_of_plane(u, data)]
 
 
 @final
 @dataclass(frozen=True)
-class OnRound(Term):
-    """Constraint: a place lies on a circle, cylinder or sphere; data: projection, centre to place, radius, sign."""
+class OnRound(Facing):
+    """A place lies on a circle, cylinder or sphere; data: projection, centre to place, radius, sign."""
 
     on_face: ClassVar[bool] = True
 
     @property
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """One row."""
-        return 0, 1, 1, self.axes * self.axes + self.axes + 2, 0
+    def rows(self) -> int:
+        """One."""
+        return 1
 
-    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+    @property
+    def own(self) -> int:
+        """Projection, centre to place, radius, sign."""
+        return self.axes * self.axes + self.axes + 2
+
+    def missed(self, u: Side, data: ca.SX) -> list[ca.SX]:
         """The gap."""
-        return [_gap_of_round(u[0], data)]
+        return [_gap_of_round(u, data)]
 
 
 @final
 @dataclass(frozen=True)
-class Sticking(Term):
-    """Constraint: a place does not move along an obstacle; data: for each direction along it, a unit vector and the
-    displacement that it keeps.
+class Sticking(Facing):
+    """A place does not move along an obstacle; data: for each direction along it, a unit vector and the displacement
+    that it keeps.
     """
 
     along_face: ClassVar[bool] = True
 
     @property
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """One row in the plane, two in space."""
-        count = self.axes - 1
-        return 0, 1, count, count * (self.axes + 1), 0
+    def rows(self) -> int:
+        """One in the plane, two in space."""
+        return self.axes - 1
 
-    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+    @property
+    def own(self) -> int:
+        """A vector and a number for each row."""
+        return (self.axes - 1) * (self.axes + 1)
+
+    def missed(self, u: Side, data: ca.SX) -> list[ca.SX]:
         """How far it is from where it is to stay."""
         n = self.axes
         parts = [data[k * (n + 1) : (k + 1) * (n + 1)] for k in range(n - 1)]
-        return [ca.dot(part[:n], ca.vertcat(*u[0])) - part[n] for part in parts]
+        return [ca.dot(part[:n], ca.vertcat(*u)) - part[n] for part in parts]
 
 
 @final
