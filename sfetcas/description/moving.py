@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from ..errors import SceneError
 from .contacts import Contact
@@ -65,7 +65,9 @@ def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], spring
 def check_contact(
     analysis: Analysis,
     contacts: Mapping[str, Contact],
+    nodes: Mapping[str, Node],
     members: Mapping[str, Member],
+    motions: Mapping[str, Motion],
     sections: Mapping[str, CrossSection],
     space: bool,
 ) -> None:
@@ -88,7 +90,7 @@ def check_contact(
             more = "" if contact.between_members else ", generalised-alpha"
             raise SceneError(f"{found}, accepted: radau-3, radau-2{more}", where)
         if contact.node is not None:
-            _check_carried(analysis, contact, where)
+            _check_carried(analysis, contact, nodes[contact.node], motions.values(), where)
         # Names of nothing are refused elsewhere.
         for member in (name for name in members_of(contact, members) if name in members):
             section = sections.get(str(members[member].section))
@@ -97,11 +99,14 @@ def check_contact(
                 raise SceneError(f"{message}, accepted: a small rhoA", where)
 
 
-def _check_carried(analysis: Analysis, contact: Contact, where: tuple[str, ...]) -> None:
+def _check_carried(
+    analysis: Analysis, contact: Contact, node: Node, motions: Iterable[Motion], where: tuple[str, ...]
+) -> None:
     """Refuse an obstacle that a node carries with what motions do not know of it."""
-    if contact.friction > 0.0:
-        message = "found of an obstacle that a node carries in a motion, accepted: with analysis.type = 'static', or 0"
-        raise SceneError(message, (*where, "friction"))
+    turned = any(motion.node == contact.node and motion.rotation is not None for motion in motions)
+    if contact.friction > 0.0 and (contact.type != "plane" or node.support != "clamped" or turned):
+        message = f"found of an obstacle that the node {contact.node!r} carries in a motion, accepted: of a plane on a"
+        raise SceneError(f"{message} clamped node that motions displace and do not turn, or 0", (*where, "friction"))
     if analysis.initial == "equilibrium":
         message = "found 'equilibrium' with an obstacle that a node carries, accepted: a motion that begins undeformed"
         raise SceneError(message, ("analysis", "initial"))

@@ -961,7 +961,8 @@ def _check_moving(scene: Scene) -> None:
     if analysis.moves:
         check_no_contact(analysis, scene.contacts, scene.springs)
     if analysis.type == "dynamic":
-        check_contact(analysis, scene.contacts, scene.members, scene.sections, scene.resolved_dimension == "space")
+        tables = scene.contacts, scene.nodes, scene.members, scene.motions, scene.sections
+        check_contact(analysis, *tables, scene.resolved_dimension == "space")
         check_unilateral(analysis, scene.springs, scene.tendons)
         check_driving(analysis, scene.nodes, scene.members, scene.motions, scene.histories, scene.tendons)
 

@@ -421,7 +421,7 @@ class Events:
         if rubs is None or self._rubbing is None:
             return None
         if not rubs.slides.any() or self._speed(taken.after) >= -BACK:
-            return 1.0 if rubs.drifted(self._rubbing.displacements(taken.after.y)) > DRIFTED else None
+            return 1.0 if rubs.drifted(self._rubbed_at(taken.after)) > DRIFTED else None
         # What begins to slide has no speed yet.
         begun = BACK if self._speed(taken.begin) <= BACK else 0.0
 
@@ -514,7 +514,7 @@ class Events:
         if self._rubbing is None or memory.rubs is None:
             return memory, np.zeros(0, bool)
         rubs, rubbing, touches = memory.rubs, self._rubbing, touching[self._rough]
-        u = rubbing.displacements(memory.y)
+        u = self._rubbed_at(memory)
         along = rubbing.along(u, rubbing.of_quantities(memory.rates[0]))
         speeds = np.linalg.norm(along, axis=1)
         still = touches & (speeds <= STILL)
@@ -532,6 +532,11 @@ class Events:
         slides = (touches & ~sticks).astype(float)
         found = Rubs(sticks.astype(float), slides, 0.0 * held, ways, frames, held)
         return replace(memory, rates=_with_velocity(memory.rates, velocity), rubs=found), still
+
+    def _rubbed_at(self, memory: Memory) -> Array:
+        """Displacements (m, axes) of the places that rub, relative to obstacles that move."""
+        assert self._rubbing is not None
+        return self._rubbing.displacements(memory.y, self.system.loading(self.system.factors(memory.t)).shift)
 
     def _settled(
         self, memory: Memory, acting: Array, touching: Array, h: float, still: Array

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..mechanics.balance import three
 from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
+from ..mechanics.terms import GROUND
 from .projecting import factor_closings
 
 if TYPE_CHECKING:
@@ -70,11 +72,21 @@ def rubbed(rubbing: Rubbing, equations: Equations, free: State, loading: Loading
     return found
 
 
-def pushed_along(rubbing: Rubbing, loading: Loading, forces: Array) -> Loading:
-    """Loads with forces (m, axes) along obstacles added, dimensionless."""
-    on_places = np.zeros_like(loading.force)
+def pushed_along(rubbing: Rubbing, loading: Loading, forces: Array, arms: Array) -> Loading:
+    """Loads with forces (m, axes) along obstacles added, and their opposites on what carries these, dimensionless.
+
+    ``arms`` (m, axes) are the places that rub, seen from what carries their obstacles.
+    """
+    on_places, couple, moment = (np.zeros_like(part) for part in (loading.force, loading.couple, loading.moment))
     np.add.at(on_places, rubbing.places, forces)
-    return replace(loading, force=loading.force + on_places, own=loading.own + on_places)
+    carried = np.flatnonzero(rubbing.carriers != GROUND)
+    np.add.at(on_places, rubbing.carriers[carried], -forces[carried])
+    for k in carried.tolist():
+        back = -np.cross(three(arms[k]), three(forces[k]))
+        couple[rubbing.carriers[k]] += back
+        moment[rubbing.turns[k]] += back
+    force, own = loading.force + on_places, loading.own + on_places
+    return replace(loading, force=force, own=own, couple=loading.couple + couple, moment=loading.moment + moment)
 
 
 REDUNDANT = 1e-9

@@ -89,7 +89,8 @@ class Mover:
         friction = np.zeros((0, 0))
         if system.rubbing is not None and sample.rubs is not None:
             friction = rubbed(system.rubbing, equations, free, balanced, sample)
-            balanced = pushed_along(system.rubbing, balanced, friction)
+            arms = system.rubbing.arms(sample.y, balanced.shift)
+            balanced = pushed_along(system.rubbing, balanced, friction, arms)
         state = self._balanced(equations, free, balanced)
         fields = Fields(equations, state, balanced)
         kinetic = self.inertia.kinetic(sample.v)

@@ -150,8 +150,9 @@ class System(Expressions):
     def data(self, number: int, given: Given, unwrapped: ca.MX) -> ca.MX:
         """As of :meth:`.SymbolicTerms.data`, with what members remember from behind the angles in ``unwrapped``."""
         data, angles = super().data(number, given, unwrapped), self.model.unwrapping.count
-        if self.rubbing is not None and number == self.rubbing.group:
-            return self.rubbing.parts(self.rubs(unwrapped))[3]
+        if self.rubbing is not None and number in self.rubbing.groups:
+            told = self.rubbing.parts(self.rubs(unwrapped))[3][:, self.rubbing.groups[number].tolist()]
+            return ca.vertcat(told, data[self.rubbing.told :, :])
         if number - 1 not in self._memory:
             return data
         group, part = self._memory[number - 1]

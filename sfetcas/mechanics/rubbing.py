@@ -10,6 +10,8 @@ with the multiplier of its gap as ``N``.  ``d`` follows from the *way* ``a`` alo
 earlier: with the shares ``v = s a + w``, ``w`` across ``a``, it is ``(a + w / s) / |a + w / s|``, in the plane ``a``.
 This goes on smoothly where ``s`` falls through zero: steps may go beyond the end of sliding, where they are cut.
 
+Displacements and velocities along a plane that motions displace are those relative to it.
+
 Everything is dimensionless; ``m`` is the number of places that rub.
 """
 
@@ -23,9 +25,9 @@ import numpy as np
 
 from ..mathematics.arrays import Array, Index
 from ..mathematics.constants import picked
-from .contact_joints import directions_along
+from .contact_joints import Facing, directions_along
 from .model import Model
-from .terms import Term, name_of
+from .terms import GROUND, name_of
 from .unilateral import UnilateralRows
 
 __all__ = ["STILL", "Rubbing", "Rubs", "rubbing_of"]
@@ -76,7 +78,7 @@ class Rubs:
 class _Kind:
     """The places that rub on flat, or on round, obstacles: their numbers among all, and the data of their gaps."""
 
-    kind: Term
+    kind: Facing
     members: Index
     data: Array
 
@@ -96,9 +98,13 @@ class Rubbing:
         Numbers of the rows that hold them.
     places : ndarray (m,)
         Numbers of their places.
+    carriers : ndarray (m,)
+        Numbers of the places that carry the obstacles; -1 where these stay.
+    turns : ndarray (m,)
+        Numbers of their rotations.
     coefficients : ndarray (m,)
-    group : int
-        Number of the group of terms that hold them.
+    groups : mapping of int to ndarray
+        Groups of terms that hold them, and which of them.
     """
 
     def __init__(self, model: Model, unilateral: UnilateralRows) -> None:
@@ -111,13 +117,27 @@ class Rubbing:
         self.coefficients = np.array([model.scene.contacts[spot.contact].friction for spot in spots])
         first = len(model.positions.rows)
         numbers = range(1, len(model.terms))
-        self.group = next(i for i in numbers if model.terms[i].kind.along_face)
-        self.rows = first + model.terms[self.group].labels
+        stops = [model.scene.obstacles[spot.contact] for spot in spots]
+        self.carriers = np.array(
+            [GROUND if stop.carrier is None else model.segments.place(stop.carrier) for stop in stops], np.intp
+        )
+        carriers = [stop.carrier for stop in stops]
+        turns = [None if node is None else model.rotations.node_turn[node] for node in carriers]
+        self.turns = np.array([GROUND if turn is None else turn for turn in turns], np.intp)
+        starts = [model.scene.center_lines[spot.member].positions(np.array([spot.at]))[0] for spot in spots]
+        bases = [np.zeros(3) if node is None else model.scene.nodes[node].position for node in carriers]
+        self._arms = (np.array(starts) - np.array(bases))[:, : self.axes] / model.scales.length
+        self.rows, self.groups = np.zeros((len(spots), self.axes - 1), np.intp), dict[int, Index]()
+        for i in numbers:
+            kind = model.terms[i].kind
+            if isinstance(kind, Facing) and kind.along_face:
+                self.groups[i] = np.flatnonzero((self.carriers != GROUND) == kind.carried)
+                self.rows[self.groups[i]] = first + model.terms[i].labels
         # Each gap is a row of the group of flat or of round obstacles.
         self._kinds = []
         for i in numbers:
             group = model.terms[i]
-            if not group.kind.on_face:
+            if not (isinstance(group.kind, Facing) and group.kind.on_face):
                 continue
             labels = (first + group.labels).ravel()
             members = np.flatnonzero(np.isin(self.gaps, labels))
@@ -150,13 +170,30 @@ class Rubbing:
 
     # -- numbers ----------------------------------------------------------------------------------------
 
-    def displacements(self, y: Array) -> Array:
-        """Displacements (m, axes) of the places for the displacement unknowns; no motion is prescribed to them."""
-        return np.asarray((self._model.positions.Y @ y).reshape(-1, self.axes)[self.places])
+    def displacements(self, y: Array, shift: Array | None = None) -> Array:
+        """Displacements (m, axes) of the places for the displacement unknowns; no motion is prescribed to them.
+
+        ``shift`` (places * axes,) are the prescribed displacements of other places, without which they are not those
+        relative to obstacles that these carry; normals and directions on planes are the same.
+        """
+        found = (self._model.positions.Y @ y).reshape(-1, self.axes)[self.places]
+        return np.asarray(found if shift is None else found - self._of_carriers(shift))
+
+    def _of_carriers(self, x: Array) -> Array:
+        """Those (m, axes) of what carries the obstacles, of displacements or velocities of all places."""
+        each = x[: self.axes * len(self._model.segments.places)].reshape(-1, self.axes)
+        return np.where(self.carriers[:, None] == GROUND, 0.0, each[self.carriers])
+
+    def arms(self, y: Array, shift: Array) -> Array:
+        """The places (m, axes) seen from the nodes that carry their obstacles; arguments of :meth:`displacements`."""
+        return np.asarray(self._arms + self.displacements(y, shift))
 
     def of_quantities(self, x: Array) -> Array:
-        """Positions or velocities (m, axes) of the places among those of all quantities (quantities,)."""
-        return np.asarray(x[: self.axes * len(self._model.segments.places)].reshape(-1, self.axes)[self.places])
+        """Positions or velocities (m, axes) of the places, relative to obstacles that move, among those of all
+        quantities (quantities,).
+        """
+        each = x[: self.axes * len(self._model.segments.places)].reshape(-1, self.axes)
+        return np.asarray(each[self.places] - self._of_carriers(x))
 
     def normals(self, u: Array) -> Array:
         """Unit normals (m, axes) of the obstacles for displacements (m, axes) of the places."""
@@ -212,6 +249,12 @@ class Rubbing:
         slides, _, ways, _ = self.parts(flat)
         own = (axes * self.places[:, None] + np.arange(axes)).ravel()
         u, v = (ca.reshape(picked(part, own), axes, m) for part in (places, rates))
+        moving = np.flatnonzero(self.carriers != GROUND)
+        if len(moving):
+            its = (axes * self.carriers[moving][:, None] + np.arange(axes)).ravel()
+            u, v = ca.MX(u), ca.MX(v)
+            for part, every in ((u, places), (v, rates)):
+                part[:, moving.tolist()] -= ca.reshape(picked(every, its), axes, len(moving))
         pushes = picked(lam, self.gaps)
         found = [ca.MX.zeros(axes, m), ca.MX.zeros(axes, axes * m), ca.MX.zeros(axes, m), ca.MX.zeros(axes, axes * m)]
         for one in self._kinds:
@@ -231,25 +274,25 @@ def rubbing_of(model: Model, unilateral: UnilateralRows) -> Rubbing | None:
     return Rubbing(model, unilateral) if rubs else None
 
 
-def _symbols(kind: Term) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+def _symbols(kind: Facing) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """Displacement, data of the gap, way and velocity of a place."""
     axes = kind.axes
     return ca.SX.sym("u", axes), ca.SX.sym("data", kind.sizes[3]), ca.SX.sym("way", axes), ca.SX.sym("v", axes)
 
 
-def _normal_of(kind: Term, u: ca.SX, data: ca.SX) -> ca.SX:
-    (gap,) = kind.residual([], [ca.vertsplit(u)], data, ca.SX())
+def _normal_of(kind: Facing, u: ca.SX, data: ca.SX) -> ca.SX:
+    (gap,) = kind.missed(ca.vertsplit(u), data)
     return ca.gradient(gap, u)
 
 
 @functools.cache
-def _normal(kind: Term) -> ca.Function:
+def _normal(kind: Facing) -> ca.Function:
     """``(u, data) ->`` unit normal of an obstacle."""
     u, data, _, _ = _symbols(kind)
     return ca.Function(f"normal_{name_of(kind)}", [u, data], [ca.densify(_normal_of(kind, u, data))])
 
 
-def _direction_of(kind: Term, u: ca.SX, data: ca.SX, way: ca.SX, v: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _direction_of(kind: Facing, u: ca.SX, data: ca.SX, way: ca.SX, v: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Direction of sliding, and the speed along the way."""
     normal = _normal_of(kind, u, data)
     along, v = way - ca.dot(normal, way) * normal, v - ca.dot(normal, v) * normal
@@ -263,7 +306,7 @@ def _direction_of(kind: Term, u: ca.SX, data: ca.SX, way: ca.SX, v: ca.SX) -> tu
 
 
 @functools.cache
-def _direction(kind: Term) -> ca.Function:
+def _direction(kind: Facing) -> ca.Function:
     """``(u, data, way, v) ->`` direction of sliding, and the speed along the way."""
     symbols = _symbols(kind)
     found = [ca.densify(part) for part in _direction_of(kind, *symbols)]
@@ -271,7 +314,7 @@ def _direction(kind: Term) -> ca.Function:
 
 
 @functools.cache
-def _sliding(kind: Term) -> ca.Function:
+def _sliding(kind: Facing) -> ca.Function:
     """``(u, data, lam, weight, way, v) ->`` residual of the force of friction on a place; its derivatives by u, lam, v.
 
     ``weight`` is the coefficient where it slides, else zero.
