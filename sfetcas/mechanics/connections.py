@@ -294,14 +294,14 @@ class _Toucher:
 
     def _facing(self, kind: Facing, spot: Spot, stop: Obstacle, data: Array, row: str) -> One:
         """A constraint on a place of a member that an obstacle sees."""
-        places, axes, unit = (self.segments.place(spot.place),), self.element.axes, self.scales.length
+        place, axes, unit = self.segments.place(spot.place), self.element.axes, self.scales.length
         turn = None if stop.carrier is None else self.rotations.node_turn[stop.carrier]
         if stop.carrier is None or turn is None:
-            return One(kind, spot.contact, "", data, (), places, row)
+            return One(kind, spot.contact, "", data, (), (place,), row)
         start = self.scene.center_lines[spot.member].positions(np.array([spot.at]))[0] - stop.place
         arm = stop.place - np.asarray(self.scene.nodes[stop.carrier].position)
         data = np.concatenate([data, start[:axes] / unit, arm[:axes] / unit])
-        places = (*places, self.segments.place(stop.carrier))
+        places = (place, self.segments.place(stop.carrier))
         return One(kind, spot.contact, stop.carrier, data, (turn,), places, row)
 
     def _sticking(self, spot: Spot) -> One:

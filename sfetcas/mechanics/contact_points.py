@@ -221,9 +221,7 @@ class RoughGap(Term):
         data = self.smooth.sizes[3] + 3 + self.axes * (self.axes + 2 * self.members)
         return self.smooth.sizes[0], 2 + self.members, 0, data, 0
 
-    def _parts(
-        self, q: list[Side], u: list[Side], data: ca.SX
-    ) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, list[ca.SX]]:
+    def _parts(self, q: list[Side], u: list[Side], data: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, list[ca.SX]]:
         """The gap, its normal, friction (axes,), the slip (axes,), and the tangents of the members, all as seen from
         the obstacle.
         """

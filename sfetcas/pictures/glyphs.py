@@ -132,7 +132,7 @@ def _symbol(sketch: Sketch, node: str, down: Array) -> _Symbol:
 
 def _sketch_contact(sketch: Sketch, name: str, contact: Contact) -> None:
     if not contact.between_members:
-        sketch_obstacle(sketch, name, obstacle(contact, sketch.step.model.space))
+        sketch_obstacle(sketch, name, sketch.step.fields.obstacle(name))
 
 
 def _sketch_node(sketch: Sketch, name: str, node: Node) -> None:
