@@ -16,7 +16,6 @@ from .. import tolerances
 from ..description.actuation import Actuation, Magnet, MagneticField
 from ..description.contacts import Contact
 from ..description.loads import Load, Motion
-from ..description.obstacles import obstacle
 from ..description.rings import Ring
 from ..description.sections import evaluate
 from ..description.springs import Spring
