@@ -314,8 +314,8 @@ class Scene(Record):
     def touches_at_points(self) -> bool:
         """Whether it is an unknown where members touch, see :mod:`sfetcas.mechanics.contact_points`.
 
-        They touch each other, have a radius on obstacles, or laws that touches as conditions of elements do not know, or
-        obstacles move.
+        They touch each other, have a radius on obstacles, or laws that touches as conditions of elements do not know;
+        or obstacles move.
         """
         return any(_why_points(self, name) for name in self.contacts)
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+from typing import cast
 
 import casadi as ca
 import numpy as np
@@ -129,21 +130,22 @@ class Rubbing:
         self._arms = (np.array(starts) - np.array(bases))[:, : self.axes] / model.scales.length
         self.rows, self.groups = np.zeros((len(spots), self.axes - 1), np.intp), dict[int, Index]()
         for i in numbers:
-            kind = model.terms[i].kind
-            if isinstance(kind, Facing) and kind.along_face:
-                self.groups[i] = np.flatnonzero((self.carriers != GROUND) == kind.carried)
+            if model.terms[i].kind.along_face:
+                # Beside the place it has that of what carries the obstacle.
+                carried = model.terms[i].places.shape[1] > 1
+                self.groups[i] = np.flatnonzero((self.carriers != GROUND) == carried)
                 self.rows[self.groups[i]] = first + model.terms[i].labels
         # Each gap is a row of the group of flat or of round obstacles.
         self._kinds = []
         for i in numbers:
             group = model.terms[i]
-            if not (isinstance(group.kind, Facing) and group.kind.on_face):
+            if not group.kind.on_face:
                 continue
             labels = (first + group.labels).ravel()
             members = np.flatnonzero(np.isin(self.gaps, labels))
             own = np.array([int(np.flatnonzero(labels == row)[0]) for row in self.gaps[members]], np.intp)
             if len(members):
-                self._kinds.append(_Kind(group.kind, members, group.data[own]))
+                self._kinds.append(_Kind(cast(Facing, group.kind), members, group.data[own]))
 
     def __len__(self) -> int:
         return len(self.of)
