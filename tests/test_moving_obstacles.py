@@ -136,8 +136,8 @@ def test_strip_lies_on_a_floor_that_is_lifted():
     def push(step):
         return np.reshape(step.contacts["floor"]["force"], (-1, 3)).sum(axis=0)
 
-    # 36 N of the weight of 60 N are on the floor: places are known to 1e-6, and what is free of the strip, 0.6 m clamped
-    # at both ends, has 192 EI / l^3 = 900 N/m.
+    # 36 N of the weight of 60 N are on the floor: places are known to 1e-6, and what is free of the strip, 0.6 m
+    # clamped at both ends, has 192 EI / l^3 = 900 N/m.
     np.testing.assert_allclose(push(lifted), push(stays), atol=1e-3)
     assert push(lifted)[1] > 30.0
     np.testing.assert_allclose(lifted.position("B"), stays.position("B"), atol=1e-6)
