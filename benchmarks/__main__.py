@@ -3,8 +3,8 @@
 Names are order, loads, size, repeated, derivatives, net, path, motion, steps, code, accuracy, pieces, sweep, import,
 extremes and compared; left out, all are run.  ``--save`` writes what each prints into ``benchmarks/results`` too.
 
-Others, ``random``, ``jitter``, ``contact``, ``members`` and ``ways``, stand alone, take options (``--help``) and half
-an hour each.
+Others, ``random``, ``jitter``, ``contact``, ``members``, ``ways`` and ``heap``, stand alone, take options (``--help``)
+and half an hour each.
 
 Not a test: times are those of the machine at hand, the least of several or medians as the tables say.
 """
@@ -23,6 +23,7 @@ from .compared import compared
 from .contact_run import contact
 from .derivatives import derivatives
 from .extremes import extremes
+from .heap import heap
 from .importing import importing
 from .jitter import jitter
 from .many import many
@@ -47,7 +48,7 @@ def main(words: list[str]) -> None:
     known |= {"steps": step_cost, "code": code, "accuracy": knob, "pieces": pieces, "sweep": many}
     known |= {"import": importing, "extremes": extremes, "compared": compared}
     alone: dict[str, Callable[[list[str]], None]] = {"random": random_scenes, "jitter": jitter}
-    alone |= {"contact": contact, "members": members, "ways": ways}
+    alone |= {"contact": contact, "members": members, "ways": ways, "heap": heap}
     if words[:1] and words[0] in alone:
         alone[words[0]](words[1:])
         return

@@ -35,7 +35,7 @@ def rows(printed):
 def test_benchmark_of_another_name_is_refused():
     accepted = (
         "net, path, motion, steps, code, accuracy, pieces, sweep, import, extremes, compared, "
-        "random, jitter, contact, members, ways"
+        "random, jitter, contact, members, ways, heap"
     )
     with pytest.raises(SystemExit, match=rf"found benchmark 'nets', accepted: .*{accepted}$"):
         main(["nets"])
@@ -182,3 +182,12 @@ def test_random_scenes_are_counted(capsys):
 def test_what_takes_too_long_is_killed_and_counted():
     (outcome,) = benchmark_random.random_run([8], seconds=0.0)
     assert (outcome.kind, outcome.others) == ("too slow", {})
+
+
+def test_a_heap_is_measured(capsys):
+    """It falls for a moment, without gaining energy or penetrating."""
+    main(["heap", "--rods", "3", "--end", "0.1", "--step", "0.005"])
+    (found,) = rows(capsys.readouterr().out)
+    assert found[:3] == ["3", "0.1", "20"]
+    assert float(found[6]) < 1e-12
+    assert float(found[7].split()[0]) <= 1e-6

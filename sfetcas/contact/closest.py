@@ -25,7 +25,18 @@ from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Mesh
 from ..mechanics.segments import standing, stations_of_line
 
-__all__ = ["Closest", "Near", "Pair", "PairKey", "answers"]
+__all__ = [
+    "NEXT_TO",
+    "SAME",
+    "Closest",
+    "Near",
+    "Pair",
+    "PairKey",
+    "answers",
+    "closest_on_pieces",
+    "downhill",
+    "locally_least",
+]
 
 PIECES = 4
 """Straight pieces of an element at least."""
@@ -331,8 +342,8 @@ class Closest:
             # The tree gives the lower number first.
             i, j = (chosen if a <= b else chosen[:, ::-1]).T - np.array([[starts[a]], [starts[b]]])
             p, r = points[first], points[second]
-            s, t, distances = _closest_on_pieces(p[i], p[i + 1], r[j], r[j + 1])
-            least = _locally_least(i, j, distances, len(r)) & (distances < pair.distance + reach + 0.5 * longest)
+            s, t, distances = closest_on_pieces(p[i], p[i + 1], r[j], r[j + 1])
+            least = locally_least(i, j, distances, len(r)) & (distances < pair.distance + reach + 0.5 * longest)
             at = np.array([x[first][i] + s * (x[first][i + 1] - x[first][i]), x[second][j] + t * np.diff(x[second])[j]])
             least &= ~self._next_to(pair, *at)
             if least.any():
@@ -363,7 +374,7 @@ class Closest:
         begin = at.copy()
         for _ in range(ITERATIONS):
             slope, curvature, apart = self._half_square(fields, pair, at)
-            step = _downhill(slope, curvature, at) / lengths
+            step = downhill(slope, curvature, at) / lengths
             # As long as the pieces at most: a minimum is not far from where pieces are nearest.
             limit = np.maximum(0.25 * apart, longest) / lengths
             step = np.clip(step, -limit, limit)
@@ -505,7 +516,7 @@ class Closest:
         return np.asarray(change / ((high - low) * self.lengths[member])[:, None])
 
 
-def _downhill(slope: Array, curvature: Array, at: Array) -> Array:
+def downhill(slope: Array, curvature: Array, at: Array) -> Array:
     """Steps (2, n) in both arc lengths, m, towards the minimum; none beyond an end of a member.
 
     Downhill also where the distance is curved the other way, or not at all: of the curvatures the sizes are taken.
@@ -524,7 +535,7 @@ def _downhill(slope: Array, curvature: Array, at: Array) -> Array:
     return np.where(both, together, np.where(free, alone, 0.0))
 
 
-def _locally_least(i: Index, j: Index, distances: Array, columns: int) -> Array:
+def locally_least(i: Index, j: Index, distances: Array, columns: int) -> Array:
     """Of pairs of pieces those that are not farther apart than any pair beside them; of equal ones the first."""
     width = columns + 2
     keys = (i + 1) * width + j + 1
@@ -543,7 +554,7 @@ def _locally_least(i: Index, j: Index, distances: Array, columns: int) -> Array:
     return least
 
 
-def _closest_on_pieces(p: Array, p_end: Array, r: Array, r_end: Array) -> tuple[Array, Array, Array]:
+def closest_on_pieces(p: Array, p_end: Array, r: Array, r_end: Array) -> tuple[Array, Array, Array]:
     """Where straight pieces (n, 3) are nearest to each other, fractions (n,) of both, and the distance (n,).
 
     Source: Ericson 2005, Real-Time Collision Detection, section 5.1.9.

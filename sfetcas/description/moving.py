@@ -88,9 +88,11 @@ def check_contact(
         if analysis.integrator in ("idas", "conserving"):
             found = f"found with the integrator {analysis.integrator!r}, which does not find when it is touched"
             more = "" if contact.between_members else ", generalised-alpha"
-            raise SceneError(f"{found}, accepted: radau-3, radau-2{more}", where)
+            raise SceneError(f"{found}, accepted: radau-3, radau-2{more}, stepping", where)
         if contact.node is not None:
             _check_carried(analysis, contact, nodes[contact.node], motions.values(), where)
+        if analysis.integrator == "stepping":
+            _check_stepping(analysis, name, contact)
         # Names of nothing are refused elsewhere.
         for member in (name for name in members_of(contact, members) if name in members):
             section = sections.get(str(members[member].section))
@@ -109,6 +111,19 @@ def _check_carried(
         raise SceneError(f"{message} clamped node that motions displace and do not turn, or 0", (*where, "friction"))
     if analysis.initial == "equilibrium":
         message = "found 'equilibrium' with an obstacle that a node carries, accepted: a motion that begins undeformed"
+        raise SceneError(message, ("analysis", "initial"))
+
+
+def _check_stepping(analysis: Analysis, name: str, contact: Contact) -> None:
+    """Refuse what steps with impulses do not know."""
+    if contact.friction > 0.0:
+        message = "found with the integrator 'stepping', which has impulses across surfaces alone, accepted: radau-3"
+        raise SceneError(f"{message}, radau-2, generalised-alpha, or 0", ("contacts", name, "friction"))
+    if contact.node is not None:
+        message = f"found the node {contact.node!r} with the integrator 'stepping', accepted: radau-3, radau-2"
+        raise SceneError(f"{message}, generalised-alpha, or obstacles that stay", ("contacts", name, "node"))
+    if analysis.initial == "equilibrium":
+        message = "found 'equilibrium' with the integrator 'stepping', accepted: a motion that begins undeformed"
         raise SceneError(message, ("analysis", "initial"))
 
 
@@ -139,7 +154,7 @@ def check_unilateral(analysis: Analysis, springs: Mapping[str, Spring], tendons:
         if tendon.may_be_slack and tendon.friction is not None:
             message = "found with a given length in a motion, which does not find when what slides is slack, accepted:"
             raise SceneError(f"{message} pushes = true, or a stiffness", ("tendons", name, "friction"))
-    if analysis.integrator not in ("idas", "conserving"):
+    if analysis.integrator not in ("idas", "conserving", "stepping"):
         return
     found = f"found with the integrator {analysis.integrator!r}, which does not find when"
     accepted = "accepted: radau-3, radau-2, generalised-alpha"

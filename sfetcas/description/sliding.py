@@ -78,7 +78,7 @@ def check_sliding(
     if analysis.count_of_modes:
         message = "found with modes, in which it would slide to and fro, accepted: without friction"
         raise SceneError(message, ("tendons", name, "friction"))
-    if analysis.integrator in ("conserving", "idas"):
+    if analysis.integrator in ("conserving", "stepping", "idas"):
         message = f"found {analysis.integrator!r} with friction in the guides of a tendon"
         raise SceneError(f"{message}, accepted: radau-3, radau-2 or generalised-alpha", ("analysis", "integrator"))
 

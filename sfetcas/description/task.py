@@ -163,8 +163,8 @@ class Analysis(Record):
     step : s
         Dynamic: fixed time step, not with ``idas``.  Default: chosen by the accuracy.
     integrator : text
-        Dynamic: ``radau-3``, ``radau-2``, ``generalised-alpha``, ``conserving`` or ``idas`` (which needs rotary
-        inertia where masses do not resist a turn).  Default: ``radau-3``.
+        Dynamic: ``radau-3``, ``radau-2``, ``generalised-alpha``, ``conserving``, ``stepping`` (many impacts at once in
+        fixed steps) or ``idas`` (which needs rotary inertia where masses do not resist a turn).  Default: ``radau-3``.
     initial : text
         Dynamic: the motion begins ``undeformed``, or at rest in the ``equilibrium`` of loads and motions as
         their histories give them at t = 0, with factor 1 where there is none.
@@ -189,7 +189,7 @@ class Analysis(Record):
     end: Positive | None = None
     output: Positive | None = None
     step: Positive | None = None
-    integrator: Literal["radau-3", "radau-2", "generalised-alpha", "conserving", "idas"] | None = None
+    integrator: Literal["radau-3", "radau-2", "generalised-alpha", "conserving", "stepping", "idas"] | None = None
     initial: Literal["undeformed", "equilibrium"] = "undeformed"
     cut: Names = ()
     release: Names = ()
@@ -220,6 +220,8 @@ class Analysis(Record):
             spacing = getattr(self, key)
             if spacing is not None and spacing > self.end:
                 raise SceneError(f"found {spacing:g} s, accepted: up to the span of {self.end:g} s", (key,))
+        if self.step is None and self.integrator == "stepping":
+            raise SceneError("the key 'step' is missing: steps with impulses are not chosen by their error", ("step",))
         if self.step is not None and self.integrator == "idas":
             accepted = "without 'step', or another integrator"
             message = f"found {self.step:g} s with 'idas', which chooses its steps itself, accepted: {accepted}"

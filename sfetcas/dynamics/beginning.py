@@ -246,6 +246,11 @@ def _given(system: StageEquations, equations: Equations) -> tuple[Array, Array, 
     """Rows of the rates of the unknowns that are given, their values, and where they stand in the scene."""
     model, scene, unit = equations.model, equations.model.scene, system.masses.time
     axes, turns = model.element.axes, model.element.turns
+    if all(node.velocity is None for node in scene.nodes.values()) and all(
+        member.spin is None for member in scene.members.values()
+    ):
+        # Of many members the tables below would be large.
+        return np.zeros((0, equations.unknowns)), np.zeros(0), []
     rows: list[Array] = []
     values: list[Array] = []
     names: list[tuple[str, ...]] = []
@@ -274,8 +279,6 @@ def _given(system: StageEquations, equations: Equations) -> tuple[Array, Array, 
             rows.append(turning_of[turns * number : turns * (number + 1)])
             values.append(spin[3 - turns :])
             names += [("members", name, "spin")] * turns
-    if not rows:
-        return np.zeros((0, equations.unknowns)), np.zeros(0), []
     # A motion begins relaxed, so that nothing of it relaxes yet.
     for place in (number for number in model.segments.relaxing.flat if number >= 0):
         own = moving_of[axes * place : axes * (place + 1)]

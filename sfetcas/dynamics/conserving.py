@@ -35,7 +35,7 @@ from ..mechanics.terms import Side, Term, name_of
 from .methods import Begin, Method
 from .stages import StageEquations
 
-__all__ = ["Conserving"]
+__all__ = ["Conserving", "Middle", "check_conserving"]
 
 
 @final
@@ -55,32 +55,7 @@ class Conserving(Method):
         SceneError
             There is a follower load, which has no energy to conserve, or the axes rotate.
         """
-        model = system.model
-        if any(group.follows for group in model.groups.values()):
-            name = next(name for name, load in model.scene.loads.items() if load.frame != "fixed")
-            message = "found a follower with the integrator 'conserving', accepted: loads with a potential"
-            raise SceneError(message, ("loads", name))
-        if model.rotating_frame is not None:
-            message = "found with the integrator 'conserving', accepted: radau-3, radau-2, generalised-alpha"
-            raise SceneError(message, ("rotating",))
-        for name in model.scene.tubes:
-            message = "found with the integrator 'conserving', which cannot follow a twist without inertia of its own"
-            raise SceneError(f"{message}, accepted: radau-3, radau-2, generalised-alpha", ("tubes", name))
-        for member in model.scene.members.values():
-            section = str(member.section)
-            if member.stretches(model.scene.sections) and model.scene.sections[section].compliance(0.5)[0, 1:].any():
-                message = (
-                    "found with the integrator 'conserving', which cannot follow shear without inertia of its own, "
-                    "accepted: radau-3, radau-2, generalised-alpha, or a section without shear"
-                )
-                own = model.scene.sections[section]
-                key = "shear" if own.shear else "law" if own.law is not None and own.law.form.strains > 1 else "GA2"
-                raise SceneError(message, ("sections", section, key))
-        for member in model.scene.members.values():
-            off = member.off_line(model.scene.sections)
-            if off:
-                message = f"found {off} with the integrator 'conserving', accepted: radau-3, radau-2, generalised-alpha"
-                raise SceneError(message, ("sections", str(member.section)))
+        check_conserving(system, self.name)
         n = system.layout
         q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
         begin = Begin(
@@ -91,7 +66,7 @@ class Conserving(Method):
             ca.MX.sym("unwrapped", n.unwrapped),
         )
         h, factors = ca.MX.sym("h"), ca.MX.sym("factors", n.factors, 2)
-        found = _Middle(system, begin, h, factors, q, y, lam)
+        found = Middle(system, begin, h, factors, q, y, lam)
         step = system.solved(found.entries, [2.0 / h**2], found.residual, begin.unwrapped)
         (there,), shift, more, size = system.moved([q], step)
         constants = [begin.q, begin.y, begin.x, begin.rates, begin.unwrapped, h, factors]
@@ -106,7 +81,7 @@ class Conserving(Method):
         return 2.0 * moved / h - rates
 
 
-class _Middle:
+class Middle:
     """Residual and entries of a step, in the order of :meth:`StageEquations.solved` for one stage."""
 
     def __init__(
@@ -167,6 +142,43 @@ class _Middle:
     def _inner(system: StageEquations, mean: ca.MX, rotation_jacobian: ca.MX, c: ca.MX, b: ca.MX) -> list[ca.MX]:
         """What masses within elements add."""
         return system.hung(mean, rotation_jacobian, c, b) if len(system.massive) else []
+
+
+def check_conserving(system: StageEquations, integrator: str) -> None:
+    """Refuse what the scheme cannot follow.
+
+    Raises
+    ------
+    SceneError
+        There is a follower load, which has no energy to conserve, the axes rotate, there are tubes, or sections that
+        shear or carry mass off the line.
+    """
+    model = system.model
+    if any(group.follows for group in model.groups.values()):
+        name = next(name for name, load in model.scene.loads.items() if load.frame != "fixed")
+        message = f"found a follower with the integrator {integrator!r}, accepted: loads with a potential"
+        raise SceneError(message, ("loads", name))
+    if model.rotating_frame is not None:
+        message = f"found with the integrator {integrator!r}, accepted: radau-3, radau-2, generalised-alpha"
+        raise SceneError(message, ("rotating",))
+    for name in model.scene.tubes:
+        message = f"found with the integrator {integrator!r}, which cannot follow a twist without inertia of its own"
+        raise SceneError(f"{message}, accepted: radau-3, radau-2, generalised-alpha", ("tubes", name))
+    for member in model.scene.members.values():
+        section = str(member.section)
+        if member.stretches(model.scene.sections) and model.scene.sections[section].compliance(0.5)[0, 1:].any():
+            message = (
+                f"found with the integrator {integrator!r}, which cannot follow shear without inertia of its own, "
+                "accepted: radau-3, radau-2, generalised-alpha, or a section without shear"
+            )
+            own = model.scene.sections[section]
+            key = "shear" if own.shear else "law" if own.law is not None and own.law.form.strains > 1 else "GA2"
+            raise SceneError(message, ("sections", section, key))
+    for member in model.scene.members.values():
+        off = member.off_line(model.scene.sections)
+        if off:
+            message = f"found {off} with the integrator {integrator!r}, accepted: radau-3, radau-2, generalised-alpha"
+            raise SceneError(message, ("sections", str(member.section)))
 
 
 # -- functions of single things, made once a process ---------------------------------------------------

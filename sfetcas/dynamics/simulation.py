@@ -44,6 +44,7 @@ from .motion import MotionState, Mover, StopEvent, Trajectory
 from .sampling import StepRecord
 from .shaping import shaped, stretched
 from .stages import StageEquations
+from .stepping import Stepping
 from .watching import Watch, finer
 
 __all__ = ["INTEGRATORS", "Simulation", "left", "simulate"]
@@ -53,6 +54,7 @@ USUAL = "radau-3"
 
 INTEGRATORS: dict[str, Callable[[StageEquations, Callable[[float], Any] | None], Integrator]] = {
     **{m.name: partial(Stages, method=m) for m in (Radau(3), Radau(2), GeneralisedAlpha(), Conserving())},
+    "stepping": Stepping,
     "idas": Idas,
 }
 """Integrators by name: (system, progress) -> Integrator; ``progress`` is called with the time reached, s."""
@@ -166,7 +168,10 @@ class Simulation:
     def run(self, mesh: Mesh, rounds: int, before: int | None = None) -> MeshRun:
         """The motion on a mesh, after so many coarser runs, the last of which took so many steps."""
         begin = time.perf_counter()
-        mesh = replace(mesh, spots=spots_of(self.scene, mesh)) if self.scene.contacts else mesh
+        # Steps with impulses know of contact without rows.
+        stepping = self.name == "stepping"
+        if self.scene.contacts:
+            mesh = replace(mesh, spots=() if stepping else spots_of(self.scene, mesh))
         model = assemble(self.scene, mesh, assembly="nodal")
         equations = Equations(model, kernels=self.settings.kernels)
         masses = masses_of(model)
@@ -186,7 +191,7 @@ class Simulation:
         self.seconds["build"] += time.perf_counter() - built
         mover = Mover(equations, Inertia(system), masses.time, system.factors)
         begun, notes = self.begun(system, mover.free if len(unilateral) else None)
-        if any(contact.between_members for contact in self.scene.contacts.values()):
+        if any(contact.between_members for contact in self.scene.contacts.values()) and not stepping:
 
             def with_rows(approaches: tuple[Approach, ...]) -> StageEquations:
                 near = assemble(self.scene, replace(mesh, approaches=approaches), assembly="nodal")
@@ -265,9 +270,9 @@ class Simulation:
             state = replace(found, lam=state.lam, unwrapped=model.unwrapping.angles(found.q, state.unwrapped))
         touching = self._touching(system, state)
         if self.weightless:
-            if self.name == "conserving":
+            if self.name in ("conserving", "stepping"):
                 message = (
-                    "found 'conserving' with a flexible member without mass, whose shape it lets swing without end"
+                    f"found {self.name!r} with a flexible member without mass, whose shape it lets swing without end"
                 )
                 accepted = "accepted: radau-3, radau-2 or generalised-alpha, or a small rhoA"
                 raise SceneError(f"{message}, {accepted}", ("analysis", "integrator"))

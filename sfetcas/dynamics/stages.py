@@ -78,14 +78,19 @@ class StageEquations(System):
         singular, and a large one where a row does not act.
         """
         stages = residual.shape[1]
+        matrix, system = self.matrix(entries, inertia, unwrapped)
+        left = ca.vec(residual.T)
+        found = self._eliminated(matrix, left[system.order], stages)
+        return -ca.reshape(found[system.back], stages, self.total).T
+
+    def matrix(self, entries: list[ca.MX], inertia: list[ca.MX], unwrapped: ca.MX) -> tuple[ca.MX, Pattern]:
+        """The matrix of :meth:`solved`, and the order of its unknowns."""
+        stages = len(inertia)
         system = self._system(stages)
         dual = [-DUAL_REGULARISATION / part for part in inertia]
         if len(self.unilateral):
             dual += [-(1.0 - self.switches(unwrapped)) / (DUAL_REGULARISATION * part) for part in inertia]
-        matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries, *dual)))
-        left = ca.vec(residual.T)
-        found = self._eliminated(matrix, left[system.order], stages)
-        return -ca.reshape(found[system.back], stages, self.total).T
+        return ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries, *dual))), system
 
     def _eliminated(self, matrix: ca.MX, right: ca.MX, stages: int) -> ca.MX:
         """Solution of a system of all stages; what relaxes, which stands last, is eliminated first."""

@@ -13,6 +13,7 @@ __all__ = [
     "TINY",
     "Array",
     "Index",
+    "Sparse",
     "first_of_largest",
     "fixed",
     "length_of",
@@ -29,6 +30,9 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 Index = np.ndarray[Any, np.dtype[np.intp]]
 """An array of places in another one."""
+
+Sparse = Any
+"""A sparse matrix of SciPy, which is imported only where it is needed."""
 
 TINY = 1e-300
 """Keeps zero from being divided by; no number that means anything is smaller."""

@@ -1,0 +1,247 @@
+"""Centre lines of all members at once that are rigid or keep their length: many places, and what forces there do.
+
+Along an element the line is a polynomial, the sum of the turned tangents of its points with weights that depend on the
+place.  A place is an element and a fraction of it.  What turns by a Rodrigues vector ``psi`` gains exactly
+``psi x (a_0 + a_1) / 2``: with the mean of the tangents of two states the derivatives are exact between these, as those
+of :mod:`~sfetcas.dynamics.conserving` are.  Everything is dimensionless, in two or three axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array, Index, Sparse
+from .segments import place_of_cut
+from .tables import Tables
+
+__all__ = ["Along", "Curve", "Lines"]
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """Places along members: numbers of their elements (n,) among those of the lines, and fractions (n,) of these."""
+
+    elements: Index
+    xi: Array
+
+    def __len__(self) -> int:
+        return len(self.xi)
+
+    def chosen(self, which: Array) -> Along:
+        """Some of them, by numbers or by a mask."""
+        return Along(self.elements[which], self.xi[which])
+
+    def with_more(self, other: Along) -> Along:
+        """These, then others."""
+        return Along(np.concatenate([self.elements, other.elements]), np.concatenate([self.xi, other.xi]))
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The lines in one state, or the mean of two.
+
+    Attributes
+    ----------
+    starts : ndarray (elements, axes)
+        Positions of the starts of elements.
+    tangents : ndarray (elements, points, axes)
+        Turned tangents of the points of elements, times weight and length.
+    """
+
+    starts: Array
+    tangents: Array
+
+    def mean(self, other: Curve) -> Curve:
+        """What gives the exact derivatives between two states."""
+        return Curve(0.5 * (self.starts + other.starts), 0.5 * (self.tangents + other.tangents))
+
+
+class Lines:
+    """The centre lines of a model.
+
+    Parameters
+    ----------
+    tables : Tables
+        They number the unknowns.
+
+    Attributes
+    ----------
+    members : tuple of str
+    first : ndarray (members + 1,)
+        Number of the first element of each member, then that of all elements; a rigid member is one element.
+    owner : ndarray (elements,)
+        Number of the member of each element.
+    length : ndarray (elements,)
+        Lengths of the elements in the undeformed scene.
+    """
+
+    def __init__(self, tables: Tables) -> None:
+        self._tables, model = tables, tables.model
+        self.model, self.axes = model, model.element.axes
+        scene, mesh, points = model.scene, model.mesh, len(model.element.points)
+        self.members = tuple(name for name in model.members if scene.members[name].type != "small")
+        unit, counts = model.scales.length, list[int]()
+        turns, tangents, places, starts, ends = [], [], [], [], []
+        for name in self.members:
+            cuts, first, line = mesh.cuts[name], model.beams.first[name], scene.center_lines[name]
+            own = np.arange(first, first + len(cuts) - 1)
+            if scene.members[name].type == "rigid":
+                begin, end = line.positions(np.array([0.0, 1.0]))[:, : self.axes] / unit
+                own, cuts = own[:1], np.array([0.0, 1.0])
+                turns.append(np.repeat(model.rotations.turns[own, :1], points, axis=1))
+                tangents.append(model.element.weights[None, :, None] * (end - begin))
+            else:
+                turns.append(model.rotations.turns[own])
+                tangents.append(model.beams.tangent[own])
+            counts.append(len(own))
+            at = line.positions(cuts)[:, : self.axes] / unit
+            starts.append(at[:-1])
+            ends.append(np.diff(cuts) * line.length / unit)
+            names = (place_of_cut(mesh, model.segments.ends, name, cut) for cut in range(len(own)))
+            places.append([model.segments.place(place) for place in names])
+        self.first = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+        self.owner = np.repeat(np.arange(len(counts)), counts)
+        self._turns, self._tangents = np.concatenate(turns), np.concatenate(tangents)
+        self._places, self._starts = np.concatenate(places).astype(np.intp), np.concatenate(starts)
+        self.length = np.concatenate(ends)
+        # Along each member lengths go on from those of the ones before.
+        self._far = np.concatenate([[0.0], np.cumsum(self.length)])
+        # Weights are polynomials of what goes from -1 to 1.
+        powers = np.vander(2.0 * model.element.points - 1.0, increasing=True)
+        self._weights = np.linalg.inv(powers) / model.element.weights
+        self._bend()
+
+    def _bend(self) -> None:
+        """What the polynomials of members that are curved in the undeformed scene miss of their centre lines."""
+        scene = self.model.scene
+        self._curved = np.array(
+            [scene.members[m].type != "rigid" and scene.center_lines[m].turning > 0.0 for m in self.members], bool
+        )
+
+    # -- states ---------------------------------------------------------------------------------------
+
+    def curve(self, q: Array, places: Array) -> Curve:
+        """The lines for rotations (rotations, components) and displacements (places, axes) of all places."""
+        turned = q[self._turns]
+        if self.model.space:
+            turned = turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+        return Curve(self._starts + places[self._places], quaternion.turned_by(turned, self._tangents))
+
+    # -- places ---------------------------------------------------------------------------------------
+
+    def at(self, member: int, x: float) -> tuple[int, float]:
+        """Number of the element, and fraction of it, at a fraction of the length of a member."""
+        first, last = self.first[member], self.first[member + 1]
+        far = self._far[first] + x * (self._far[last] - self._far[first])
+        e = int(np.clip(np.searchsorted(self._far, far, side="right") - 1, first, last - 1))
+        return e, float(np.clip((far - self._far[e]) / self.length[e], 0.0, 1.0))
+
+    def fractions(self, along: Along) -> Array:
+        """Fractions (n,) of the lengths of the members."""
+        far = self._far[along.elements] + along.xi * self.length[along.elements]
+        owner = self.owner[along.elements]
+        begin, end = self._far[self.first[owner]], self._far[self.first[owner + 1]]
+        return np.asarray(np.clip((far - begin) / (end - begin), 0.0, 1.0))
+
+    def lengths(self, along: Along) -> Array:
+        """Arc lengths (n,) from the begins of the members."""
+        first = self.first[self.owner[along.elements]]
+        return np.asarray(self._far[along.elements] + along.xi * self.length[along.elements] - self._far[first])
+
+    def moved(self, along: Along, by: Array) -> Along:
+        """Places moved by arc lengths (n,), which stop at the ends of their members."""
+        owner = self.owner[along.elements]
+        begin, end = self._far[self.first[owner]], self._far[self.first[owner + 1]]
+        far = np.clip(self._far[along.elements] + along.xi * self.length[along.elements] + by, begin, end)
+        inside = np.searchsorted(self._far, far, side="right") - 1
+        e = np.clip(inside, self.first[owner], self.first[owner + 1] - 1)
+        return Along(e, np.clip((far - self._far[e]) / self.length[e], 0.0, 1.0))
+
+    def end(self, along: Along, by: Array) -> Array:
+        """Whether places (n,) are at the end of their member to which ``by`` (n,) points, of bool."""
+        e, owner = along.elements, self.owner[along.elements]
+        low = (e == self.first[owner]) & (along.xi <= 0.0) & (by < 0.0)
+        return np.asarray(low | ((e == self.first[owner + 1] - 1) & (along.xi >= 1.0) & (by > 0.0)))
+
+    def positions(self, curve: Curve, along: Along) -> Array:
+        """Positions (n, axes)."""
+        found = curve.starts[along.elements] + np.einsum(
+            "np,npa->na", self._reach(along), curve.tangents[along.elements]
+        )
+        return found if not self._curved.any() else found + self._missed(along)
+
+    def slopes(self, curve: Curve, along: Along) -> Array:
+        """Derivatives (n, axes) of positions by the arc length."""
+        return self._derivative(curve, along, self._powers(along))
+
+    def bends(self, curve: Curve, along: Along) -> Array:
+        """Second derivatives (n, axes) of positions by the arc length."""
+        t = 2.0 * along.xi - 1.0
+        count = self._weights.shape[0]
+        powers = np.stack([2.0 * k * t ** max(k - 1, 0) for k in range(count)], axis=1)
+        return self._derivative(curve, along, powers) / self.length[along.elements][:, None]
+
+    def _derivative(self, curve: Curve, along: Along, powers: Array) -> Array:
+        found = np.einsum("np,npa->na", powers @ self._weights, curve.tangents[along.elements])
+        return np.asarray(found / self.length[along.elements][:, None])
+
+    def _powers(self, along: Along) -> Array:
+        t = 2.0 * along.xi - 1.0
+        return np.stack([t**k for k in range(self._weights.shape[0])], axis=1)
+
+    def _reach(self, along: Along) -> Array:
+        """Weights (n, points) of the tangents in the line from the start of the element."""
+        t = 2.0 * along.xi - 1.0
+        count = self._weights.shape[0]
+        powers = np.stack([(t ** (k + 1) - (-1.0) ** (k + 1)) / (2.0 * (k + 1)) for k in range(count)], axis=1)
+        return np.asarray(powers @ self._weights)
+
+    def _missed(self, along: Along) -> Array:
+        """Centre lines of the undeformed scene less the polynomials, (n, axes)."""
+        found, owner, unit = np.zeros((len(along), self.axes)), self.owner[along.elements], self.model.scales.length
+        for k in np.flatnonzero(self._curved).tolist():
+            here = np.flatnonzero(owner == k)
+            if not len(here):
+                continue
+            own, line = along.chosen(here), self.model.scene.center_lines[self.members[k]]
+            points = line.positions(self.fractions(own))[:, : self.axes] / unit
+            chords = np.einsum("np,npa->na", self._reach(own), self._tangents[own.elements])
+            found[here] = points - self._starts[own.elements] - chords
+        return found
+
+    # -- forces ---------------------------------------------------------------------------------------
+
+    def derivatives(self, curve: Curve, along: Along, directions: Array) -> Sparse:
+        """Derivatives (n, total) of ``directions`` (n, axes) times the positions by the unknowns; directions stay."""
+        n, tables, weights = len(along), self._tables, self._reach(along)
+        e = along.elements
+        arms = weights[..., None] * curve.tangents[e]
+        if self.model.space:
+            moments = np.cross(arms, directions[:, None, :])
+        else:
+            moments = (arms[..., 0] * directions[:, None, 1] - arms[..., 1] * directions[:, None, 0])[..., None]
+        cells = [
+            tables.place_cells(self._places[e]),
+            (tables.width * self._turns[e][..., None] + np.arange(tables.width)).reshape(
+                n, tables.width * weights.shape[1]
+            ),
+        ]
+        values = [directions, moments.reshape(n, cells[1].shape[1])]
+        return gathered(tables, np.concatenate(cells, axis=1), np.concatenate(values, axis=1))
+
+    def of_places(self, places: Index, directions: Array) -> Sparse:
+        """As :meth:`derivatives` of the positions of places of the model, by their numbers (n,)."""
+        return gathered(self._tables, self._tables.place_cells(places), directions)
+
+
+def gathered(tables: Tables, cells: Index, values: Array) -> Sparse:
+    """Rows (n, total) by the unknowns of values (n, k) by full coordinates (n, k), -1 for what is none."""
+    from scipy.sparse import csr_matrix
+
+    unknown = np.where(cells < 0, -1, tables.unknown[cells])
+    row, column = np.nonzero(unknown >= 0)
+    entries = values[row, column] * tables.weight[cells[row, column]]
+    return csr_matrix((entries, (row, unknown[row, column])), shape=(len(cells), tables.total))

@@ -1,0 +1,369 @@
+"""Steps with impulses: closed forms, momenta, energy, penetration, and agreement with the motion event by event."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes import made
+from scipy.sparse import csc_matrix
+from test_contact_motion import FLOOR, G, balance, ball, rod
+
+from sfetcas import SceneError, solve
+from sfetcas.contact.closest import Closest
+from sfetcas.contact.nearby import Nearby
+from sfetcas.dynamics.beginning import at_rest
+from sfetcas.mathematics.complementarity import complementary
+from sfetcas.mechanics.center_lines import Along, Lines
+from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.fields import Fields
+from sfetcas.mechanics.mesh import uniform_mesh
+from sfetcas.mechanics.model import assemble
+
+RADIUS = 0.01
+
+
+def stepped(table, step, **more):
+    """The motion of a table in steps with impulses."""
+    analysis = {**table["analysis"], "step": step, "integrator": "stepping", **more}
+    return solve(made({**table, "analysis": analysis}))
+
+
+def bars(kind, end, *, space=True, restitution=0.0, **more):
+    """Two bars that fly towards each other, crosswise in space; in the plane an end hits a side."""
+    nodes = {"a": [-0.5, 0.0, 0.0], "b": [0.5, 0.0, 0.0], "c": [0.2, 0.1, -0.5], "d": [0.2, 0.1, 0.5]}
+    if not space:
+        nodes |= {"c": [0.1, 0.05, 0.0], "d": [0.4, 0.8, 0.0]}
+    axes, up = 3 if space else 2, {"a": 0.5, "b": 0.5, "c": -0.5, "d": -0.5}
+    elements = {"elements": 4} if kind == "flexible" else {}
+    section = {"EI2": 0.5, "EI3": 0.5, "GJ": 0.5, "rhoA": 1.0, "rhoI": [2e-4, 1e-4, 1e-4]}
+    return {
+        "dimension": "space" if space else "plane",
+        "sections": {"s": {**section, **more}},
+        "nodes": {n: {"position": at[:axes], "velocity": [0.0, up[n]]} for n, at in nodes.items()},
+        "members": {
+            m: {"nodes": list(ends), "section": "s", "type": kind, **elements} for m, ends in (("m", "ab"), ("n", "cd"))
+        },
+        "contacts": {"c": {"type": "members", "members": "all", "radius": RADIUS, "restitution": restitution}},
+        "analysis": {"type": "dynamic", "end": end, "output": end / 10},
+    }
+
+
+def deepest(motion, contact="c"):
+    """The smallest gap at the times of the answer, m."""
+    return min(float(np.min(step.contacts[contact]["gap"])) for step in motion.steps)
+
+
+# -- one body -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_a_ball_comes_to_rest(dimension):
+    """It keeps no speed, and the floor then carries its weight."""
+    motion = stepped({**ball(FLOOR, [0, 1], {"end": 0.8}), "dimension": dimension}, 0.01)
+    assert motion.last.position("B")[1] == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(motion.last.contacts["stop"]["force"], [0.0, 20.0, 0.0], atol=1e-9)
+    assert motion.last.contacts["stop"]["touching"] == ["nodes.B"]
+    assert motion.last.energy["dissipated"] == pytest.approx(20.0, rel=1e-9)
+    (event,) = motion.events
+    # Found at the end of the step in which it happens, whose weight it contains.
+    assert 0.0 <= event.time - np.sqrt(2 / G) <= 0.01 + 1e-9
+    assert event.impulse == pytest.approx(2.0 * np.sqrt(2 * G), rel=0.03)
+
+
+def test_a_ball_bounces_and_finer_steps_come_nearer_to_where_it_is():
+    """The impact is somewhere in a step, so that heights are of first order."""
+    table = ball({**FLOOR, "restitution": 0.5}, [0, 1], {"end": 0.7, "output": 0.7})
+    speed, t = 0.5 * np.sqrt(2 * G), 0.7 - np.sqrt(2 / G)
+    exact = speed * t - 0.5 * G * t**2
+    for step in (0.02, 0.005, 0.00125):
+        # It leaves the floor up to a step too late, and its speed at the begin of that step is up to G h too low.
+        assert abs(stepped(table, step).last.position("B")[1] - exact) < (speed + G * t) * step
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+def test_a_point_slides_on_a_circle_and_loses_next_to_nothing(side):
+    """Until it leaves the outside, or swings through the bottom inside: to second order in the step."""
+    inside = side == "inside"
+    start = np.array([-0.8, -0.6]) if inside else np.array([0.6, 0.8])
+    stop = {"type": "circle", "center": [0, 0], "radius": 1.0, "side": side, "members": "all"}
+    end = 0.5 if inside else 0.15
+    table = ball(stop, start, {"end": end, "output": end / 5}, out=-start if inside else start)
+    motions = [stepped(table, step) for step in (end / 50, end / 100, end / 200)]
+    for motion in motions:
+        assert np.diff(motion.energies()).max() < 1e-13
+        # Where it is on the circle it is so to rounding.
+        np.testing.assert_allclose(np.linalg.norm(motion.positions("B")[:, :2], axis=1), 1.0, atol=1e-12)
+    lost = [motion.energies()[0] - motion.energies()[-1] for motion in motions]
+    assert lost[0] > 4.0 * lost[1] > 16.0 * lost[2]
+    a, b, c = (motion.last.position("B") for motion in motions)
+    assert np.linalg.norm(a - b) / np.linalg.norm(b - c) == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_rod_falls_flat_and_stays():
+    """Both ends share its weight, and all that it had is lost."""
+    motion = stepped(rod(0.0, 0.2, {"end": 0.3, "output": 0.05}), 0.005)
+    np.testing.assert_allclose(motion.last.contacts["floor"]["force"], [0.0, G, 0.0], atol=1e-9)
+    assert motion.last.energy["dissipated"] == pytest.approx(0.2 * G, rel=1e-9)
+    assert np.abs(balance(motion)).max() < 1e-12
+
+
+def test_a_rod_tips_over_as_event_by_event():
+    table = rod(0.6, 0.45, {"end": 0.4, "output": 0.1})
+    exact = solve(made({**table, "analysis": {**table["analysis"], "integrator": "radau-3", "step": 0.01}}))
+    missed = []
+    for step in (0.005, 0.0025):
+        motion = stepped(table, step)
+        missed.append(np.abs(motion.positions("B") - exact.positions("B")).max())
+        assert np.diff(motion.energies()).max() < 1e-12
+    assert missed[1] < 0.6 * missed[0]
+    assert missed[1] < 1e-4
+
+
+# -- two bodies ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("space", "restitution"), [(False, 0.0), (True, 0.6)])
+def test_rigid_bars_hit_each_other_as_event_by_event(space, restitution):
+    """Between impacts nothing acts: what is told is as accurate as steps are, of second order."""
+    table = bars("rigid", 0.3, space=space, restitution=restitution)
+    exact = solve(made({**table, "analysis": {**table["analysis"], "integrator": "radau-3", "step": 0.005}}))
+    missed = []
+    for step in (0.004, 0.002):
+        motion = stepped(table, step)
+        missed.append(np.abs(motion.positions("d") - exact.positions("d")).max())
+    assert missed[1] < 0.5 * missed[0]
+    assert missed[1] < 1e-6
+    assert motion.last.energy["total"] == pytest.approx(exact.last.energy["total"], rel=1e-5)
+    assert deepest(motion) > -1e-6 * RADIUS
+
+
+@pytest.mark.parametrize("space", [False, True])
+@pytest.mark.parametrize("restitution", [0.0, 1.0])
+def test_flexible_bars_keep_momenta_and_lose_energy(space, restitution):
+    motion = stepped(bars("flexible", 0.3, space=space, restitution=restitution, damping=0.0), 0.004)
+    assert motion.events
+    for kind in ("linear", "angular"):
+        values = np.array([step.momentum[kind] for step in motion.steps])
+        np.testing.assert_allclose(values, np.tile(values[0], (len(values), 1)), atol=1e-12)
+    # Rounding of energies of 0.2 J.
+    assert np.diff(motion.energies()).max() < 1e-13
+    assert motion.energies()[-1] < 0.99 * motion.energies()[0]
+    np.testing.assert_allclose(balance(motion), balance(motion)[0], atol=1e-11)
+    assert deepest(motion) > -1e-6 * RADIUS
+
+
+def test_a_bar_falls_on_a_beam_that_is_clamped_and_carries_a_hinge():
+    """Supports and joints beside contact: forces on the beam are told, nothing penetrates, no energy is gained."""
+    table = bars("flexible", 0.5)
+    table["gravity"] = [0, -G]
+    table["nodes"]["a"] = {"position": [-0.5, 0, 0], "support": "clamped"}
+    table["nodes"]["b"] = {"position": [0.5, 0, 0], "joint": "hinge"}
+    table["nodes"]["e"] = {"position": [0.8, 0, 0]}
+    table["sections"]["stiff"] = {**table["sections"]["s"], "EI2": 50.0, "EI3": 50.0, "GJ": 50.0}
+    table["members"]["m"]["section"] = "stiff"
+    table["members"]["arm"] = {"nodes": ["b", "e"], "section": "s", "type": "rigid"}
+    for node in "cd":
+        table["nodes"][node].pop("velocity")
+    motion = stepped(table, 0.004)
+    assert motion.events
+    assert np.diff(motion.energies()).max() < 1e-12
+    assert deepest(motion) > -1e-6 * RADIUS
+    np.testing.assert_allclose(motion.positions("a"), np.tile([-0.5, 0, 0], (len(motion.steps), 1)), atol=1e-12)
+
+
+def test_what_is_missed_before_a_step_is_found_after_it(monkeypatch):
+    """Also if nothing at all is found before it."""
+    found = Nearby.found
+
+    def blind(self, curve, reach, *, ends=True):
+        there = found(self, curve, reach, ends=ends)
+        return there.chosen(np.zeros(0, int)) if ends else there
+
+    monkeypatch.setattr(Nearby, "found", blind)
+    motion = stepped(bars("rigid", 0.12), 0.004, output=0.004)
+    assert motion.events
+    assert deepest(motion) > -1e-6 * RADIUS
+
+
+def test_rods_that_lie_along_each_other_do_not_penetrate_anywhere():
+    """One falls on a beam and slides along it: touches wander from element to element."""
+    table = bars("flexible", 0.24, space=False)
+    table["gravity"] = [0, -G]
+    table["sections"]["s"] |= {"EI3": 0.02}
+    for member in "mn":
+        table["members"][member]["elements"] = 2
+    table["nodes"] = {
+        "a": {"position": [-0.5, 0.0], "support": "clamped"},
+        "b": {"position": [0.5, 0.0], "support": "slider", "direction": [1.0, 0.0]},
+        "c": {"position": [-0.45, 0.0205], "velocity": [0.5, -1.0]},
+        "d": {"position": [0.45, 0.024], "velocity": [0.5, -1.0]},
+    }
+    motion = stepped(table, 0.004, output=0.004)
+    assert np.diff(motion.energies()).max() < 1e-12
+    assert deepest(motion) > -1e-6 * RADIUS
+
+
+# -- many ---------------------------------------------------------------------------------------------------
+
+
+def heap(count, kind="flexible"):
+    """Rods that lie above each other and fall on a floor."""
+    rng, nodes, members = np.random.default_rng(1), {}, {}
+    for k in range(count):
+        angle, tilt = rng.uniform(0, np.pi), rng.uniform(-0.02, 0.02)
+        middle, half = np.array([0.0, 0.02 + 0.04 * k, 0.0]), 0.3 * np.array([np.cos(angle), tilt, np.sin(angle)])
+        nodes |= {f"a{k}": {"position": list(middle - half)}, f"b{k}": {"position": list(middle + half)}}
+        members[f"m{k}"] = {"nodes": [f"a{k}", f"b{k}"], "section": "s", "type": kind}
+        members[f"m{k}"] |= {"elements": 4} if kind == "flexible" else {}
+    return {
+        "dimension": "space",
+        "gravity": [0, -G, 0],
+        "sections": {"s": {"shape": "circle", "radius": RADIUS, "E": 1e7, "nu": 0.3, "rho": 1000.0}},
+        "nodes": nodes,
+        "members": members,
+        "contacts": {
+            "c": {"type": "members", "members": "all", "radius": RADIUS},
+            "floor": {"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0], "members": "all"},
+        },
+        "analysis": {"type": "dynamic", "end": 0.2, "output": 0.02},
+    }
+
+
+@pytest.mark.parametrize("kind", ["rigid", "flexible"])
+def test_a_heap_falls_without_gaining_energy_or_penetrating(kind):
+    motion = stepped(heap(4, kind), 0.002)
+    touched = {event.name for event in motion.events}
+    assert touched == {"contacts.c", "contacts.floor"}
+    weight = 4 * 0.6 * np.pi * RADIUS**2 * 1000.0 * G
+    assert np.diff(motion.energies()).max() < 1e-13 * weight
+    assert deepest(motion) > -1e-6 * RADIUS
+    assert min(float(motion.positions(f"a{k}")[:, 1].min()) for k in range(4)) > -1e-9
+    np.testing.assert_allclose(balance(motion), 0.0, atol=1e-9)
+
+
+# -- refusals -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"friction": 0.3},
+            r"contacts.floor.friction: found with the integrator 'stepping', which has impulses across",
+        ),
+        ({"initial": "equilibrium"}, r"analysis.initial: found 'equilibrium' with the integrator 'stepping'"),
+        ({"step": None}, r"analysis.step: the key 'step' is missing"),
+        ({"motion": True}, r"motions.push: found with the integrator 'stepping'"),
+    ],
+)
+def test_what_steps_with_impulses_do_not_know_is_refused(change, message):
+    table = rod(0.3, 0.1, {"end": 0.2, "integrator": "stepping", "step": 0.01})
+    if "friction" in change:
+        table["contacts"]["floor"]["friction"] = change["friction"]
+    elif "motion" in change:
+        table["nodes"]["A"]["support"] = "clamped"
+        table["motions"] = {"push": {"node": "A", "displacement": [0.1, 0.0], "history": "h"}}
+        table["histories"] = {"h": {"t": [0, 1], "polynomial": [[0, 0, 1]]}}
+    else:
+        table["analysis"] |= change
+        table["analysis"] = {key: value for key, value in table["analysis"].items() if value is not None}
+    with pytest.raises(SceneError, match=message):
+        solve(made(table))
+
+
+def test_what_begins_inside_is_refused():
+    table = bars("rigid", 0.1)
+    for node in "cd":
+        table["nodes"][node]["position"][1] = 0.01
+    with pytest.raises(SceneError, match=r"contacts.c: members 'n' and 'm' penetrate by 0.01 m at t = 0"):
+        stepped(table, 0.01)
+
+
+# -- parts --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("count", "rank"), [(6, 6), (8, 5)])
+def test_complementarity_against_all_choices(count, rank):
+    """Also where rows depend on each other: then what they do together is unique."""
+    rng = np.random.default_rng(count)
+    rows = rng.normal(size=(count, rank))
+    matrix, b = rows @ rows.T, rows @ rng.normal(size=rank)
+    found = np.zeros(count)
+    for _ in range(4):
+        # From solution to solution what makes it unique dies away.
+        found = complementary(csc_matrix(matrix), b, found)
+    assert found is not None
+    opening = matrix @ found + b
+    assert found.min() >= 0.0
+    assert opening.min() > -1e-8
+    assert abs(found @ opening) < 1e-8
+    best = [
+        rows[list(chosen)].T @ x
+        for size in range(count + 1)
+        for chosen in itertools.combinations(range(count), size)
+        for x in [np.linalg.lstsq(matrix[np.ix_(chosen, chosen)], -b[list(chosen)], rcond=None)[0]]
+        if (x >= -1e-12).all() and (matrix[:, list(chosen)] @ x + b >= -1e-9).all()
+    ]
+    np.testing.assert_allclose(rows.T @ found, best[0], atol=1e-7)
+
+
+def _near(dimension, seed=3):
+    """Equations and a state of rods at random, of which some are rigid and one is curved."""
+    rng, nodes, members = np.random.default_rng(seed), {}, {}
+    axes = 3 if dimension == "space" else 2
+    for k in range(8):
+        middle, way = rng.uniform(-0.4, 0.4, axes), rng.normal(size=axes)
+        # An arc is in a plane that is known.
+        way[2:] *= k != 2
+        half = 0.5 * way / np.linalg.norm(way)
+        nodes |= {f"a{k}": {"position": list(middle - half)}, f"b{k}": {"position": list(middle + half)}}
+        kinds = ({"type": "rigid"}, {}, {"shape": {"type": "arc", "angle": 0.5}})
+        members[f"m{k}"] = {"nodes": [f"a{k}", f"b{k}"], "section": "s", **kinds[k % 3 if k < 3 else 1]}
+    section = {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0, "rhoA": 1.0}
+    contact = {"type": "members", "members": "all", "radius": RADIUS}
+    table = {"dimension": dimension, "sections": {"s": section}, "nodes": nodes, "members": members}
+    scene = made({**table, "contacts": {"c": contact}})
+    mesh = uniform_mesh(scene, 2, 5)
+    model = assemble(scene, replace(mesh, places=True, spots=()), assembly="nodal")
+    equations = Equations(model)
+    return equations, at_rest(model)
+
+
+def _curve(lines, equations, state):
+    places = (equations.model.positions.Y @ state.y).reshape(-1, lines.axes)
+    return lines.curve(state.q, places)
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_lines_have_the_derivatives_of_their_positions(dimension):
+    equations, state = _near(dimension)
+    lines, rng = Lines(equations.tables), np.random.default_rng(0)
+    change = np.concatenate([0.3 * rng.normal(size=equations.unknowns), np.zeros(equations.rows)])
+    state = equations.moved(state, change)
+    along = Along(np.arange(len(lines.owner)), rng.uniform(size=len(lines.owner)))
+    ways = rng.normal(size=(len(along), lines.axes))
+    found = lines.derivatives(_curve(lines, equations, state), along, ways)
+    step = rng.normal(size=equations.total)
+    step[equations.unknowns :] = 0.0
+    ends = [
+        (ways * lines.positions(_curve(lines, equations, equations.moved(state, s * step)), along)).sum(axis=1)
+        for s in (1e-6, -1e-6)
+    ]
+    np.testing.assert_allclose(found @ step, (ends[0] - ends[1]) / 2e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_the_same_minima_are_found_as_by_the_search_of_statics(dimension):
+    equations, state = _near(dimension)
+    lines = Lines(equations.tables)
+    closest, curve = Closest(equations.model.scene), _curve(lines, equations, state)
+    nearby = Nearby(lines, closest)
+    reach, unit = 0.1, equations.model.scales.length
+    found = nearby.found(curve, reach / unit, ends=False)
+    gaps = np.sort(nearby.gaps(curve, found)) * unit
+    fields = Fields(equations, state, equations.model.loading(0.0))
+    wanted = np.sort([near.gap for near in closest.found(fields, reach)])
+    assert len(wanted) > 5
+    # Lines of curved members between the ends of their elements differ by the error of the mesh.
+    np.testing.assert_allclose(gaps, wanted, atol=1e-5)
