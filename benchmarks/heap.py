@@ -57,7 +57,7 @@ def heap(words: list[str]) -> None:
     options.add_argument("--end", type=float, default=0.4, help="time, s")
     options.add_argument("--step", type=float, default=1e-3, help="step, s")
     given = options.parse_args(words)
-    head("rods", "reached, s", "steps", "touches", "CPU seconds", "ms a step and rod", "largest gain of energy", "depth")
+    head("rods", "reached, s", "steps", "touches", "CPU seconds", "ms a step and rod", "gain of energy", "depth")
     for count in given.rods:
         begin = time.process_time()
         try:
