@@ -82,7 +82,7 @@ class Conserving(Method):
 
 
 class Middle:
-    """Residual and entries of a step, in the order of :meth:`StageEquations.solved` for one stage."""
+    """Residual and entries of a step, in the order that the stage equations solve for one stage."""
 
     def __init__(
         self, system: StageEquations, begin: Begin, h: ca.MX, factors: ca.MX, q: ca.MX, y: ca.MX, lam: ca.MX
