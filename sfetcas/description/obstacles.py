@@ -6,7 +6,7 @@ space: a member slides over it, and the normal is that of the member).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -21,6 +21,7 @@ from .structure import Node
 
 __all__ = [
     "Obstacle",
+    "carriers",
     "check_start",
     "edge_slopes",
     "members_of",
@@ -123,6 +124,11 @@ def obstacle(contact: Contact, space: bool) -> Obstacle:
     sign = -1.0 if contact.side == "inside" else 1.0
     place = np.asarray(contact.center, dtype=float)
     return Obstacle("round", place, across, np.zeros(3), float(contact.radius or 0.0), sign, carrier=contact.node)
+
+
+def carriers(contacts: Mapping[str, Contact]) -> frozenset[str]:
+    """Names of the nodes that carry obstacles."""
+    return frozenset(contact.node for contact in contacts.values() if contact.node is not None)
 
 
 def members_of(contact: Contact, members: Iterable[str]) -> list[str]:

@@ -35,7 +35,7 @@ from .moving import (
     check_unilateral,
     check_velocities,
 )
-from .obstacles import Obstacle, check_start, members_of, obstacle
+from .obstacles import Obstacle, carriers, check_start, members_of, obstacle
 from .records import Named, Record, Vector, brief, counted, enumerated, number, say, unknown
 from .remembering import check_memory, refuse_memory, remembering_section
 from .rings import Ring, begins_at, check_ring
@@ -271,11 +271,6 @@ class Scene(Record):
         stops = {name: obstacle(one, space) for name, one in self.contacts.items() if not one.between_members}
         return MappingProxyType(stops)
 
-    @property
-    def carriers(self) -> frozenset[str]:
-        """Names of the nodes that carry obstacles."""
-        return frozenset(contact.node for contact in self.contacts.values() if contact.node is not None)
-
     @cached_property
     def tendon_pieces(self) -> Mapping[str, tuple[Piece, ...]]:
         """The straight pieces and the stretches along members of the way of each tendon, by name."""
@@ -314,8 +309,7 @@ class Scene(Record):
     def touches_at_points(self) -> bool:
         """Whether it is an unknown where members touch, see :mod:`sfetcas.mechanics.contact_points`.
 
-        They touch each other, have a radius on obstacles, or laws that touches as conditions of elements do not know;
-        or obstacles move.
+        They touch each other, have a radius or laws that touches as conditions of elements lack, or obstacles move.
         """
         return any(_why_points(self, name) for name in self.contacts)
 
@@ -516,7 +510,7 @@ def _check_members(scene: Scene) -> None:
     used |= {ring.node for ring in scene.rings.values()}
     for name, contact in scene.contacts.items():
         _known(contact.node, scene.nodes, "nodes", "contacts", name, "node")
-    held = {name for name in scene.carriers if scene.nodes[name].support != "free"}
+    held = {name for name in carriers(scene.contacts) if scene.nodes[name].support != "free"}
     for name in scene.nodes:
         if name not in used | held:
             message = "node without member, accepted: a node where at least one member ends, of a ring, or with a"

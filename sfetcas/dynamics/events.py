@@ -465,7 +465,8 @@ class Events:
         # What closes again and again at one time hops for less than the shortest step.
         speeds = collision.speeds(before, closes)
         self._hops = np.where(closes, self._hops + 1, self._hops) if self._again else closes.astype(int)
-        ebbed = self._ebbing(memory.t, speeds) | (closes & (self._hops > HOPS))
+        ebbing = self._ebbing(memory.t, speeds)
+        ebbed = ebbing | (closes & (self._hops > HOPS))
         # What has hopped no further than is accepted does not rebound once more; between members, which may lie along
         # each other and hit with one end after the other, not for ever.
         hop = speeds * (memory.t - self._hit)
@@ -475,7 +476,10 @@ class Events:
             self._small = np.where(speeds > 0.0, np.where(hop < self._accepted, self._small + 1, 0), self._small)
             quiet |= closes & (self._small > CALM)
         self._hit = np.where(speeds > 0.0, memory.t, self._hit)
-        velocity, impulses, touching, lost = collision.solved(before, closes, quiet)
+        # What goes back and forth between rows for ever rests on all of them.
+        rests = closes & ((ebbing & (speeds < RESTS)) | (self._hops > ENDLESS))
+        velocity, impulses, touching, lost = collision.solved(before | rests, closes & ~rests, quiet)
+        lost += collision.held_back(before, rests)
         opened = self._opened(memory.q, memory.y, memory.t, memory)
         self._depth = np.maximum(-opened, 0.0)
         self._offset, self._last = self._depth.copy(), memory.t
@@ -690,12 +694,12 @@ def _with_velocity(rates: Array, velocity: Array) -> Array:
 SOON = 1e-3 * 0.25 ** np.arange(4)
 """Shares of the motion, the longest first, at whose end all is found together that follows an event."""
 
-HOPS = 4
-"""Times that a row closes at one time, after which it stays closed."""
+HOPS, ENDLESS = 4, 12
+"""Times that a row closes at one time, after which it does not rebound, and after which it stays closed."""
 
 RESTS = 1e-4
 """Speed of opening or closing, dimensionless, below which a row that is closed may act in place of another one: lines
-beyond their elements differ by less.
+beyond their elements differ by less; and below which what hops for less than the shortest step comes to rest.
 """
 
 CALM = 3

@@ -114,6 +114,13 @@ class Collision:
         """The nearest velocities (quantities,) that acting rows (rows,) and places that stick (m,), of bool, allow."""
         return self._velocities(self._allowed(acting, still))
 
+    def held_back(self, before: Array, rests: Array) -> float:
+        """The energy that is lost where rows (rows,) of bool come to rest beside those that act before."""
+        if not rests.any():
+            return 0.0
+        free, held = self._allowed(before), self._allowed(before | rests)
+        return max(0.0, 0.5 * float(free @ free - held @ held))
+
     def independent(self, acting: Array, sticks: Array, pushes: Array) -> Array:
         """Which rows (m, axes - 1), 1 or 0, hold places that stick, none of which follows from others.
 

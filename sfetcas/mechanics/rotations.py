@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import tolerances
+from ..description.obstacles import carriers
 from ..description.scene import Member, Node, Scene
 from ..mathematics.arrays import Array, Index, numbers, unit
 from .elements import Element
@@ -98,7 +99,7 @@ def number_rotations(scene: Scene, mesh: Mesh, element: Element) -> Rotations:
             turns += [chain[e : e + element.order + 1] for e in range(0, len(chain) - 1, element.order)]
     for name, node in scene.nodes.items():
         held = numbering.freedom[name] != RotationFreedom.FREE
-        if node.joint == "rigid" and (held or name in scene.carriers):
+        if node.joint == "rigid" and (held or name in carriers(scene.contacts)):
             numbering.of(("node", name))
     return Rotations(
         turns=np.array(turns, dtype=np.intp).reshape(-1, element.order + 1),

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..description.obstacles import members_of
+from ..description.obstacles import carriers, members_of
 from ..description.scene import Scene
 from ..description.structure import SLIDING
 from ..description.tendons import Hole, Piece
@@ -386,7 +386,7 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     retained |= set(told)
     # Turning axes act upon all that has mass.
     retained |= set(scene.nodes) if scene.rotating is not None else set()
-    retained |= {ends[ring.member, 0] for ring in scene.rings.values()} | scene.carriers
+    retained |= {ends[ring.member, 0] for ring in scene.rings.values()} | carriers(scene.contacts)
     for point in mesh.points:
         for side, touching in enumerate(point.members):
             for cut in cuts_of_point(mesh, point, side) or [0]:
