@@ -35,7 +35,7 @@ from ..mechanics.terms import Side, Term, name_of
 from .methods import Begin, Method
 from .stages import StageEquations
 
-__all__ = ["Conserving", "Middle", "check_conserving"]
+__all__ = ["Conserving", "Middle", "check_conserving", "symbols_of_step"]
 
 
 @final
@@ -56,16 +56,7 @@ class Conserving(Method):
             There is a follower load, which has no energy to conserve, or the axes rotate.
         """
         check_conserving(system, self.name)
-        n = system.layout
-        q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
-        begin = Begin(
-            ca.MX.sym("q0", n.components, n.rotations),
-            ca.MX.sym("y0", n.y),
-            ca.MX.sym("x0", n.x),
-            ca.MX.sym("rates", n.x),
-            ca.MX.sym("unwrapped", n.unwrapped),
-        )
-        h, factors = ca.MX.sym("h"), ca.MX.sym("factors", n.factors, 2)
+        q, y, lam, begin, h, factors = symbols_of_step(system)
         found = Middle(system, begin, h, factors, q, y, lam)
         step = system.solved(found.entries, [2.0 / h**2], found.residual, begin.unwrapped)
         (there,), shift, more, size = system.moved([q], step)
@@ -79,6 +70,22 @@ class Conserving(Method):
     def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
         """The velocity at the end: its mean with the velocity at the begin is the mean velocity of the step."""
         return 2.0 * moved / h - rates
+
+
+def symbols_of_step(system: StageEquations) -> tuple[ca.MX, ca.MX, ca.MX, Begin, ca.MX, ca.MX]:
+    """Symbols of the rotations, displacements and multipliers at the end of a step, of the state at its begin, of its
+    length, and of the factors of the loads at both.
+    """
+    n = system.layout
+    q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
+    begin = Begin(
+        ca.MX.sym("q0", n.components, n.rotations),
+        ca.MX.sym("y0", n.y),
+        ca.MX.sym("x0", n.x),
+        ca.MX.sym("rates", n.x),
+        ca.MX.sym("unwrapped", n.unwrapped),
+    )
+    return q, y, lam, begin, ca.MX.sym("h"), ca.MX.sym("factors", n.factors, 2)
 
 
 class Middle:

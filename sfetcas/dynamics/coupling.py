@@ -16,8 +16,7 @@ import numpy as np
 from ..mathematics.arrays import TINY, Array, Index, Sparse
 from ..mathematics.kernels import Batch
 from ..mechanics.equations import State
-from .conserving import Middle
-from .methods import Begin
+from .conserving import Middle, symbols_of_step
 from .stages import StageEquations
 
 __all__ = ["Bodies", "Moving", "StepEquations", "factored"]
@@ -123,22 +122,14 @@ class StepEquations:
         self._whole, self._size = Filled(self._order.pattern), system.total
 
     def _positions(self) -> tuple[Batch, Batch, Any]:
-        system, n = self.system, self.system.layout
-        q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
-        begin = Begin(
-            ca.MX.sym("q0", n.components, n.rotations),
-            ca.MX.sym("y0", n.y),
-            ca.MX.sym("x0", n.x),
-            ca.MX.sym("rates", n.x),
-            ca.MX.sym("unwrapped", n.unwrapped),
-        )
-        h, factors = ca.MX.sym("h"), ca.MX.sym("factors", n.factors, 2)
+        system = self.system
+        q, y, lam, begin, h, factors = symbols_of_step(system)
         found = Middle(system, begin, h, factors, q, y, lam)
         matrix, order = system.matrix(found.entries, [2.0 / h**2], begin.unwrapped)
         x = system.moving(q, y, system.given(factors[:, 1]), begin.unwrapped)
         arguments = [q, y, lam, begin.q, begin.y, begin.x, begin.rates, begin.unwrapped, h, factors]
         function = ca.Function("positions", arguments, [matrix, ca.densify(found.residual), ca.densify(x)])
-        end = ca.MX.sym("end", n.factors)
+        end = ca.MX.sym("end", system.layout.factors)
         x = system.moving(q, y, system.given(end), begin.unwrapped)
         moving = ca.Function("moving", [q, y, end, begin.unwrapped], [ca.densify(x)])
         return Batch(function, 1), Batch(moving, 1), order
