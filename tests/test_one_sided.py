@@ -5,7 +5,7 @@ import pytest
 from test_points_on_obstacles import FLOOR, LARGER, cantilever, smaller
 
 from sfetcas import solve
-from sfetcas.solvers.one_sided import complementary
+from sfetcas.mathematics.complementarity import by_pivots
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -13,7 +13,7 @@ def test_pushes_and_gaps_are_complementary(seed):
     rng = np.random.default_rng(seed)
     root = rng.standard_normal((12, 12))
     matrix, given = root @ root.T + 1e-3 * np.eye(12), rng.standard_normal(12)
-    x = complementary(matrix, given)
+    x = by_pivots(matrix, given)
     rest = given + matrix @ x
     # Rounding is that of the solution of a linear system of this condition.
     size = 1e-9 * np.abs(x).max()
@@ -37,7 +37,7 @@ def test_pivots_in_blocks_that_go_round_end():
         ]
     )
     given = np.array([4.0, -3.0, -3.0, -2.0, -3.0, 2.0])
-    x = complementary(matrix, given)
+    x = by_pivots(matrix, given)
     rest = given + matrix @ x
     # Rounding of numbers of the size of a hundred.
     assert min(x.min(), rest.min()) > -1e-12
@@ -45,7 +45,7 @@ def test_pivots_in_blocks_that_go_round_end():
 
 
 def test_what_has_no_solution_is_told():
-    assert complementary(np.array([[-1.0]]), np.array([-1.0])) is None
+    assert by_pivots(np.array([[-1.0]]), np.array([-1.0])) is None
 
 
 def test_heavy_beam_on_a_floor_presses_with_its_weight_and_where_it_begins_to_lie():

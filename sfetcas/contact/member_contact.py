@@ -152,6 +152,7 @@ class MemberContact:
         self.jumps: list[tuple[float, str]] = []
         self.redundant: bool | None = None
         self.lines = Lines(scene, self.closest, fixed)
+        self.falls = 0
 
     # -- begin ------------------------------------------------------------------------------------
 
@@ -270,8 +271,10 @@ class MemberContact:
         pushes = np.where(system.acting, -found.state.lam[pushing], 0.0)
         acts = pushes > LASTING * pushes.max(initial=0.0)
         idle = {i for i, pushed in zip(free, acts.tolist(), strict=True) if not pushed}
-        kept = [point for i, point in enumerate(every) if i not in idle]
-        return self.lines.set_out(mesh, kept), Solved(prepared, **found._asdict())
+        pressed = Solved(prepared, **found._asdict())
+        # Where those that slide are now: from there their pushes go on.
+        kept = [point for i, point in enumerate(points_of(pressed)) if i not in idle]
+        return self.lines.set_out(mesh, kept), pressed
 
     def _known(self, point: ContactPoint) -> ContactPoint:
         """A point that stays where it is, the gap of which is measured where it is now."""
@@ -574,8 +577,7 @@ class MemberContact:
                 continue
             assert there is not None
             if falling:
-                self.falls += 1
-                rest = self.fallen(mesh, there, way(part)) if self.falls <= MOST_FALLS else None
+                rest = self._fallen_on(mesh, there, way(part))
                 if rest is None:
                     return None
                 self.jumps.append((part, JUMPED))
@@ -668,17 +670,23 @@ class MemberContact:
             now = there
             if turned < SLOW and drag <= first:
                 rest = self.resolved(mesh, points_of(now), now, way)
-                if rest is not None and self._stays(now, rest):
-                    return rest
+                if rest is not None and self._near(now, rest):
+                    return rest if rest.negative == 0 else self._fallen_on(mesh, rest, way)
                 if drag <= least:
                     return None
+            # Less than what makes a step unique would lead back to the unstable state.
+            floor = BEYOND * max(-now.stability.smallest, 0.0) if now.negative else least
             # What has just been too little is so once more.
-            drag, failed = drag if failed else max(0.3 * drag, least), False
+            drag, failed = drag if failed else max(0.3 * drag, floor), False
         return None
 
-    def _stays(self, now: Solved, rest: Solved) -> bool:
-        near = self.turned(now.fields, rest.fields) < STRIDE and not self.passed(now.fields, rest.fields)
-        return near and rest.negative == 0
+    def _near(self, now: Solved, rest: Solved) -> bool:
+        return self.turned(now.fields, rest.fields) < STRIDE and not self.passed(now.fields, rest.fields)
+
+    def _fallen_on(self, mesh: Mesh, found: Solved, way: Way) -> Solved | None:
+        """Where what has come to rest at an unstable state falls to from there."""
+        self.falls += 1
+        return self.fallen(mesh, found, way) if self.falls <= MOST_FALLS else None
 
     @staticmethod
     def _nudged(found: Solved) -> Solved:

@@ -23,7 +23,9 @@ import functools
 import casadi as ca
 import numpy as np
 
-from ..mathematics.arrays import Array, Index
+from ..errors import SolveError, Status
+from ..mathematics.arrays import TINY, Array, Index
+from ..mathematics.complementarity import by_pivots
 from ..mechanics.equations import State
 from .integrating import Memory
 from .rough_impacts import Rough, rough_impulses
@@ -184,7 +186,7 @@ class Collision:
         taking, found = np.flatnonzero(touching), np.zeros(len(touching), bool)
         rows = self._signs[taking, None] * self._jacobian[self._rows[taking]]
         back = self._onto(self._always, rows.T, np.zeros(len(self._always)))
-        found[taking] = _complementary(rows @ back, -opening[taking]) > 0.0
+        found[taking] = _pushing(rows @ back, -opening[taking]) > 0.0
         return found
 
     def _rough(self, taking: Index) -> tuple[Index, list[Rough]]:
@@ -223,12 +225,12 @@ class Collision:
         """Impulses, speeds of closing after them, the energy that is lost, and the speeds of rebound, (n,) each."""
         closing = np.maximum(speed, 0.0)
         rebound = restitution * closing
-        found = _complementary(yielding, speed + rebound)
+        found = _pushing(yielding, speed + rebound)
         left = speed - yielding @ found
         lost = 0.5 * float(found @ (speed + left))
         if lost < 0.0 and rebound.any():
             rebound = restitution[speed > 0.0].min() * closing
-            found = _complementary(yielding, speed + rebound)
+            found = _pushing(yielding, speed + rebound)
             left = speed - yielding @ found
             lost = 0.5 * float(found @ (speed + left))
         return found, left, max(lost, 0.0), rebound
@@ -251,29 +253,21 @@ class Collision:
         return np.asarray(found[:n])
 
 
-def _complementary(yielding: Array, speed: Array) -> Array:
+def _pushing(yielding: Array, speed: Array) -> Array:
     """The impulses p (n,), none below zero, with ``speed - yielding p`` not above zero, and zero where p is not.
 
     ``yielding`` (n, n) is symmetric and has no eigenvalue below zero.
     """
-    from scipy.optimize import nnls
-
-    values, vectors = np.linalg.eigh(0.5 * (yielding + yielding.T))
-    root = np.sqrt(np.maximum(values, MASSLESS * values.max(initial=TINY)))
-    found = np.asarray(nnls(root[:, None] * vectors.T, (vectors.T @ speed) / root)[0])
-    # It errs by the square root of what counts as no mass: those that push are found once more by themselves.
-    push = np.flatnonzero(found > 0.0)
-    own = yielding[np.ix_(push, push)]
-    better = found[push] + np.linalg.lstsq(own, speed[push] - own @ found[push], rcond=MASSLESS)[0]
-    if len(push) and (better > 0.0).all():
-        found[push] = better
+    found = by_pivots(yielding, -speed)
+    if found is None:
+        raise SolveError(Status.FAILED, f"which of {len(speed)} impulses at one time push was not found")
     return found
 
 
 SLOW = 1e-9
 """Speed of opening, over the largest closing speed or dimensionless, up to which a row stays closed in an impact."""
 
-LIGHT, MASSLESS, TINY = 1e-6, 1e-12, 1e-300
+LIGHT, MASSLESS = 1e-6, 1e-12
 """Share of the largest mass below which an unknown keeps it in its unit, and of a unit that counts as no mass; and what
 is divided by instead of zero.
 """

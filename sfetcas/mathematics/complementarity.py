@@ -1,14 +1,18 @@
-"""Linear complementarity: forces that only push, with sparse matrices of what they do to each other.
+"""Linear complementarity: forces that only push, and gaps that do not become less than none.
 
     x >= 0,      A x + b >= 0,      x . (A x + b) = 0
 
-Which forces push is mostly known from a problem like it: Newton's method on ``min(x, A x + b) = 0``, which lets all
+With few forces, or where what they do to each other is no energy: pivots, all wrong signs at once and, where that goes
+round, Lemke's, which lead to a solution wherever ``A`` is of an energy, and mostly where it is not.
+
+With many forces ``A`` is sparse.  Which forces push is mostly known from a problem like it: Newton's method on ``min(x, A x + b) = 0``, which lets all
 that is infeasible change sides at once, then ends within a few steps.  Where it does not, an interior-point method
 leads to the solution in a number of steps that hardly grows.  Where rows depend on each other a small diagonal makes
 the solution unique.  It multiplies the change from a solution that is near, so that it has no part in where a
 sequence of such solutions ends.
 
-Source: Kojima, Megiddo, Noma and Yoshise 1991, A unified approach to interior point algorithms for linear
+Source: Lemke 1965 (pivots); Judice and Pires 1994 (blocks of them); Cottle, Pang and Stone 2009, The Linear
+Complementarity Problem, sections 4.4 and 4.9; Kojima, Megiddo, Noma and Yoshise 1991, A unified approach to interior point algorithms for linear
 complementarity problems; Mehrotra 1992 (doi 10.1137/0802028); Rockafellar 1976 (proximal point).
 """
 
@@ -18,7 +22,7 @@ import numpy as np
 
 from .arrays import TINY, Array, Sparse
 
-__all__ = ["complementary"]
+__all__ = ["by_pivots", "complementary"]
 
 YIELDING = 1e-7
 """Diagonal that is added, over the one that is there."""
@@ -31,6 +35,14 @@ SOLVED = 1e-11
 
 FEW, MOST = 15, 100
 """Steps of Newton's method, and of the interior-point method, at most."""
+
+BLOCKS, PIVOTS = 8, 10
+"""Block pivots without fewer wrong signs, after which single ones follow; of these at most as many over the number of
+rows.
+"""
+
+ROUNDING, FLAT = 1e-11, 1e-9
+"""Share of the largest number of its kind up to which a wrong sign is rounding, and up to which a pivot is none."""
 
 SHY = 0.99
 """Share of the way to where a number would be zero that a step of the interior-point method goes."""
@@ -63,6 +75,75 @@ def complementary(matrix: Sparse, b: Array, near: Array) -> Array | None:
     found = np.zeros(len(b))
     found[able] = x * unit
     return found
+
+
+def by_pivots(matrix: Array, b: Array) -> Array | None:
+    """The solution x (n,) of a problem with a dense matrix (n, n); None where pivots lead to none.
+
+    Examples
+    --------
+    >>> by_pivots(np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-2.0, 1.0])).tolist()
+    [1.0, 0.0]
+    """
+    n, chosen = len(b), np.zeros(len(b), bool)
+    best, blocks = n + 1, BLOCKS
+    while blocks:
+        x, wrong = _tried(matrix, b, chosen)
+        if not wrong.any():
+            return x
+        count = int(wrong.sum())
+        blocks = BLOCKS if count < best else blocks - 1
+        best = min(best, count)
+        chosen = chosen ^ wrong
+    found = _by_single_pivots(matrix, b)
+    if found is None:
+        return None
+    x, wrong = _tried(matrix, b, found)
+    return None if wrong.any() else x
+
+
+def _tried(matrix: Array, b: Array, chosen: Array) -> tuple[Array, Array]:
+    """The numbers (n,) where only chosen ones may differ from zero, and which signs are wrong."""
+    x, rest, sums = np.zeros(len(b)), b.copy(), np.abs(b)
+    if chosen.any():
+        # Rows may depend on each other: then what they do together is unique.
+        x[chosen] = np.linalg.lstsq(matrix[np.ix_(chosen, chosen)], -b[chosen], rcond=None)[0]
+        rest += matrix[:, chosen] @ x[chosen]
+        sums += np.abs(matrix[:, chosen]) @ np.abs(x[chosen])
+    pulls, shut = x < -ROUNDING * np.abs(x).max(initial=0.0), rest < -ROUNDING * sums.max(initial=0.0)
+    return np.maximum(x, 0.0), np.where(chosen, pulls, shut)
+
+
+def _by_single_pivots(matrix: Array, b: Array) -> Array | None:
+    """Which numbers (n,) are not zero, by Lemke's pivots; None where they lead to no solution."""
+    n, diagonal = len(b), np.abs(np.diag(matrix))
+    # Of rows of different units each has one in which its diagonal is one.
+    unit = 1.0 / np.sqrt(np.where(diagonal > ROUNDING * diagonal.max(initial=TINY), diagonal, 1.0))
+    table = np.column_stack([np.eye(n), -unit[:, None] * matrix * unit, -np.ones(n), unit * b])
+    basis, out, enters = np.arange(n), int(np.argmin(table[:, -1])), 2 * n
+    size = np.abs(table[:, -1]).max(initial=0.0)
+    if table[out, -1] >= 0.0:
+        return np.zeros(n, bool)
+    for _ in range(PIVOTS * n):
+        table[out] /= table[out, enters]
+        others = np.arange(n) != out
+        table[others] -= np.outer(table[others, enters], table[out])
+        left, basis[out] = int(basis[out]), enters
+        if left == 2 * n:
+            return np.isin(np.arange(n), basis[basis >= n] - n)
+        # What has left lets its partner in: of each pair one is zero.
+        enters = left + n if left < n else left - n
+        column = table[:, enters]
+        able = np.flatnonzero(column > FLAT * np.abs(column).max(initial=TINY))
+        if not len(able):
+            return None
+        ratios = table[able, -1] / column[able]
+        least = able[ratios <= (1.0 + ROUNDING) * ratios.min() + ROUNDING * size]
+        last = least[basis[least] == 2 * n]
+        # Of equal ones the first in the order of words, which does not go round.
+        words = table[least, :n] / column[least, None]
+        out = int(last[0] if len(last) else least[np.lexsort(words.T[::-1])[0]])
+    return None
 
 
 def _by_newton(matrix: Sparse, b: Array, begin: Array, least: float) -> Array | None:

@@ -2,9 +2,8 @@
 
 In each of Newton's steps the system is linear but for the choice: a row either acts, its gap zero and its push not
 below zero, or it does not, its push zero and its gap not below zero.  With all other unknowns eliminated that is a
-linear complementarity problem, which is solved by pivots from the rows that acted before.
-
-Source: Murty 1974 (single pivots); Judice and Pires 1994 (blocks of them).
+linear complementarity problem, which is solved by pivots from the rows that acted before, see
+:mod:`~sfetcas.mathematics.complementarity`.
 """
 
 from __future__ import annotations
@@ -15,16 +14,11 @@ import numpy as np
 
 from .. import tolerances
 from ..mathematics.arrays import Array, Index
+from ..mathematics.complementarity import by_pivots
 from ..mechanics.equations import Equations, Point, State
 from .newton import AtLoads, Balance
 
-__all__ = ["OneSided", "complementary"]
-
-BLOCKS = 8
-"""Block pivots without fewer wrong signs, after which single ones follow."""
-
-PIVOTS = 20
-"""Pivots at most, over the number of rows."""
+__all__ = ["OneSided"]
 
 AGAIN, TIMES = 1e-8, 2
 """Relative residual from which on a choice that was made so many times is taken: others differ from it by rounding."""
@@ -68,7 +62,7 @@ class OneSided(AtLoads):
         gaps[:, 0] += point.residual[rows]
         pushes[:, 0] -= forces
         basic = np.where(self.acting[:, None], pushes, gaps)
-        found = complementary(basic[:, 1:], basic[:, 0])
+        found = by_pivots(basic[:, 1:], basic[:, 0])
         if found is None:
             return self._without_flat(moved[:, 0])
         self.acting[found > 0.0] ^= True
@@ -117,33 +111,3 @@ def _times(equations: Equations, entries: Array, x: Array, chosen: Index) -> Arr
     found = np.zeros((len(chosen), x.shape[1]))
     np.add.at(found, place[equations.row[mine]], entries[mine, None] * x[equations.column[mine]])
     return found
-
-
-def complementary(matrix: Array, given: Array) -> Array | None:
-    """The x (n,) with ``x`` and ``given + matrix x`` not below zero, and of each pair one zero; None if none is found.
-
-    ``matrix`` (n, n) has positive principal minors where the energy is convex; elsewhere there may be no solution.
-    """
-    n = len(given)
-    chosen, best, blocks = np.zeros(n, bool), n + 1, BLOCKS
-    for _ in range(PIVOTS * n + 1):
-        x, rest = np.zeros(n), given.copy()
-        if chosen.any():
-            try:
-                x[chosen] = np.linalg.solve(matrix[np.ix_(chosen, chosen)], -given[chosen])
-            except np.linalg.LinAlgError:
-                return None
-            rest = given + matrix[:, chosen] @ x[chosen]
-        signs = np.where(chosen, x, rest)
-        sizes = ROUNDING * np.abs(np.concatenate([signs, given])).max(initial=0.0)
-        wrong = np.flatnonzero(signs < -sizes)
-        if not len(wrong):
-            return x
-        if len(wrong) < best:
-            best, blocks = len(wrong), BLOCKS
-        elif blocks:
-            blocks -= 1
-        else:
-            wrong = wrong[-1:]
-        chosen[wrong] ^= True
-    return None
