@@ -51,7 +51,7 @@ SLENDEREST, FELT = 0.05, 1e-3
 that the end of a line makes by being elsewhere, below which it stays.
 """
 
-SHORTEST = 2
+FEWEST = 2
 """Ends of elements on a line up to which it may be a point."""
 
 
@@ -195,13 +195,13 @@ class Lines:
             mesh = mesh.refined(marks | {first: long})
         return mesh
 
-    def shortened(self, found: Solved) -> tuple[frozenset[PairKey], list[Near]]:
-        """Lines on obstacles that are no longer than an element, and where in it their force is."""
+    def shortened(self, found: Solved, most: int = FEWEST) -> tuple[frozenset[PairKey], list[Near]]:
+        """Lines on obstacles of at most so many ends of elements, and where between them their force is."""
         fields = found.fields
         short = {
             key: stretches
             for key, stretches in self.stretches(found).items()
-            if self.chosen(key) and all(len(stretch) <= SHORTEST for stretch in stretches)
+            if self.chosen(key) and all(len(stretch) <= most for stretch in stretches)
         }
         told = [(point, fields.contact_point(point)["push"]) for point in found.model.mesh.points]
         near: list[Near] = []
@@ -210,8 +210,10 @@ class Lines:
                 own = [(p.at[0], max(push, 0.0)) for p, push in told if p.pair == key and p.at[0] in stretch]
                 places, pushes = np.array(own).T
                 if pushes.any():
-                    at = np.array([float(places @ pushes / pushes.sum())])
-                    near += self.closest.beside(fields, self.closest.pairs[key], at, np.inf)
+                    at = float(places @ pushes / pushes.sum())
+                    # What lies beside an end of its member may slide there only from where it may go both ways.
+                    at = at if 0.0 < at < 1.0 else 0.5 * (stretch[0] + stretch[-1])
+                    near += self.closest.beside(fields, self.closest.pairs[key], np.array([at]), np.inf)
         return frozenset(short), near
 
     # -- ends -------------------------------------------------------------------------------------
@@ -318,7 +320,11 @@ class Lines:
 
 def points_of(found: Solved) -> Points:
     """The points of a state, where they are now."""
-    return tuple(replace(point, at=found.fields.contact_point(point)["at"]) for point in found.model.mesh.points)
+    fields = found.fields
+    return tuple(
+        replace(point, at=fields.contact_point(point)["at"]) if any(point.slides) else point
+        for point in found.model.mesh.points
+    )
 
 
 def beside_ends(one: ContactPoint | Near) -> bool:

@@ -35,7 +35,7 @@ from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
 from .closest import Closest, Near
 from .gripping import FIRM, Gripping, Placed
-from .lines import Lines, Points, begun, points_of
+from .lines import FEWEST, Lines, Points, begun, points_of
 
 __all__ = ["MemberContact"]
 
@@ -634,9 +634,9 @@ class MemberContact:
             found = finer
         return found
 
-    def as_points(self, found: Solved, way: Way) -> Solved | None:
-        """The state with lines on obstacles that are shorter than elements as points; None where they are lines."""
-        short, near = self.lines.shortened(found)
+    def as_points(self, found: Solved, way: Way, most: int = FEWEST) -> Solved | None:
+        """The state with lines on obstacles of at most so many ends of elements as points; None where they are lines."""
+        short, near = self.lines.shortened(found, most)
         if not short:
             return None
         points = [point for point in points_of(found) if point.pair not in short]
@@ -667,7 +667,7 @@ class MemberContact:
                 if drag > largest * max(deep, 1.0):
                     return None
                 continue
-            now = there
+            now, mesh = there, replace(there.model.mesh, points=())
             if turned < SLOW and drag <= first:
                 rest = self.resolved(mesh, points_of(now), now, way)
                 if rest is not None and self._near(now, rest):

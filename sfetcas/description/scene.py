@@ -309,9 +309,13 @@ class Scene(Record):
     def touches_at_points(self) -> bool:
         """Whether it is an unknown where members touch, see :mod:`sfetcas.mechanics.contact_points`.
 
-        They touch each other, have a radius or laws that touches as conditions of elements lack, or obstacles move.
+        In load steps they are, but beside edges, stops and tendons that may be slack; elsewhere where they touch each
+        other, have a radius or laws that touches as conditions of elements lack, or obstacles move.
         """
-        return any(_why_points(self, name) for name in self.contacts)
+        if any(_why_points(self, name) for name in self.contacts):
+            return True
+        edges = any(stop.kind == "sharp" for stop in self.obstacles.values())
+        return bool(self.contacts) and self.analysis.type == "static" and not (edges or self.stopped)
 
     @property
     def rubs(self) -> bool:
@@ -1035,8 +1039,10 @@ def _check_points(scene: Scene) -> None:
     """Refuse what is not solved together with contact whose places are unknowns."""
     if not scene.touches_at_points:
         return
-    contacts = scene.contacts
-    name, what = next((name, why) for name in contacts if (why := _why_points(scene, name)))
+    reasons = ((name, _why_points(scene, name)) for name in scene.contacts)
+    name, what = next(((name, why) for name, why in reasons if why), ("", ""))
+    if not what:
+        return
     where, found = ("contacts", name), f"found {what}"
     if scene.analysis.type != "static":
         message = f"{found} with analysis.type = {scene.analysis.type!r}"

@@ -196,6 +196,8 @@ class MemberContactSteps:
     def _with_ends(self, now: Solved, factor: float) -> Solved:
         """The state with elements that end where lines on obstacles do."""
         for _ in range(ENDS):
+            # What touches at single places slides there.
+            now = self.run.as_points(now, lambda model: model.loading(factor), 1) or now
             moved = None if self.meshes.prescribed else self.run.lines.with_moved_ends(now, self.meshes.accuracy)
             if moved is None:
                 break

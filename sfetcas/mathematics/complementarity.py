@@ -5,15 +5,16 @@
 With few forces, or where what they do to each other is no energy: pivots, all wrong signs at once and, where that goes
 round, Lemke's, which lead to a solution wherever ``A`` is of an energy, and mostly where it is not.
 
-With many forces ``A`` is sparse.  Which forces push is mostly known from a problem like it: Newton's method on ``min(x, A x + b) = 0``, which lets all
-that is infeasible change sides at once, then ends within a few steps.  Where it does not, an interior-point method
-leads to the solution in a number of steps that hardly grows.  Where rows depend on each other a small diagonal makes
-the solution unique.  It multiplies the change from a solution that is near, so that it has no part in where a
-sequence of such solutions ends.
+With many forces ``A`` is sparse.  Which forces push is mostly known from a problem like it: Newton's method on
+``min(x, A x + b) = 0``, which lets all that is infeasible change sides at once, then ends within a few steps.  Where it
+does not, an interior-point method leads to the solution in a number of steps that hardly grows.  Where rows depend on
+each other a small diagonal makes the solution unique.  It multiplies the change from a solution that is near, so that
+it has no part in where a sequence of such solutions ends.
 
 Source: Lemke 1965 (pivots); Judice and Pires 1994 (blocks of them); Cottle, Pang and Stone 2009, The Linear
-Complementarity Problem, sections 4.4 and 4.9; Kojima, Megiddo, Noma and Yoshise 1991, A unified approach to interior point algorithms for linear
-complementarity problems; Mehrotra 1992 (doi 10.1137/0802028); Rockafellar 1976 (proximal point).
+Complementarity Problem, sections 4.4 and 4.9; Kojima, Megiddo, Noma and Yoshise 1991, A unified approach to interior
+point algorithms for linear complementarity problems; Mehrotra 1992 (doi 10.1137/0802028); Rockafellar 1976 (proximal
+point).
 """
 
 from __future__ import annotations
@@ -41,8 +42,13 @@ BLOCKS, PIVOTS = 8, 10
 rows.
 """
 
+BALANCED = 4
+"""Rounds in which units of rows are found."""
+
 ROUNDING, FLAT = 1e-11, 1e-9
-"""Share of the largest number of its kind up to which a wrong sign is rounding, and up to which a pivot is none."""
+"""Share of the largest number, all of them dimensionless, up to which a wrong sign is rounding, and of the largest of a
+column up to which a pivot is none.
+"""
 
 SHY = 0.99
 """Share of the way to where a number would be zero that a step of the interior-point method goes."""
@@ -78,15 +84,21 @@ def complementary(matrix: Sparse, b: Array, near: Array) -> Array | None:
 
 
 def by_pivots(matrix: Array, b: Array) -> Array | None:
-    """The solution x (n,) of a problem with a dense matrix (n, n); None where pivots lead to none.
+    """The solution x (n,) of a problem with a dense matrix (n, n); None where pivots lead to none that is accurate.
 
     Examples
     --------
     >>> by_pivots(np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-2.0, 1.0])).tolist()
     [1.0, 0.0]
     """
-    n, chosen = len(b), np.zeros(len(b), bool)
-    best, blocks = n + 1, BLOCKS
+    try:
+        return _by_pivots(matrix, b)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _by_pivots(matrix: Array, b: Array) -> Array | None:
+    chosen, best, blocks = np.zeros(len(b), bool), len(b) + 1, BLOCKS
     while blocks:
         x, wrong = _tried(matrix, b, chosen)
         if not wrong.any():
@@ -104,21 +116,22 @@ def by_pivots(matrix: Array, b: Array) -> Array | None:
 
 def _tried(matrix: Array, b: Array, chosen: Array) -> tuple[Array, Array]:
     """The numbers (n,) where only chosen ones may differ from zero, and which signs are wrong."""
-    x, rest, sums = np.zeros(len(b)), b.copy(), np.abs(b)
+    x, rest = np.zeros(len(b)), b.copy()
     if chosen.any():
         # Rows may depend on each other: then what they do together is unique.
         x[chosen] = np.linalg.lstsq(matrix[np.ix_(chosen, chosen)], -b[chosen], rcond=None)[0]
         rest += matrix[:, chosen] @ x[chosen]
-        sums += np.abs(matrix[:, chosen]) @ np.abs(x[chosen])
-    pulls, shut = x < -ROUNDING * np.abs(x).max(initial=0.0), rest < -ROUNDING * sums.max(initial=0.0)
-    return np.maximum(x, 0.0), np.where(chosen, pulls, shut)
+    size = np.abs(np.concatenate([x, rest, b])).max(initial=0.0)
+    return np.maximum(x, 0.0), np.where(chosen, x, rest) < -ROUNDING * size
 
 
 def _by_single_pivots(matrix: Array, b: Array) -> Array | None:
     """Which numbers (n,) are not zero, by Lemke's pivots; None where they lead to no solution."""
-    n, diagonal = len(b), np.abs(np.diag(matrix))
-    # Of rows of different units each has one in which its diagonal is one.
-    unit = 1.0 / np.sqrt(np.where(diagonal > ROUNDING * diagonal.max(initial=TINY), diagonal, 1.0))
+    n, unit = len(b), np.ones(len(b))
+    # Of rows of different units each has one in which its largest number is about one.
+    for _ in range(BALANCED):
+        largest = np.abs(unit[:, None] * matrix * unit).max(axis=1, initial=0.0)
+        unit /= np.sqrt(np.where(largest > 0.0, largest, 1.0))
     table = np.column_stack([np.eye(n), -unit[:, None] * matrix * unit, -np.ones(n), unit * b])
     basis, out, enters = np.arange(n), int(np.argmin(table[:, -1])), 2 * n
     size = np.abs(table[:, -1]).max(initial=0.0)
