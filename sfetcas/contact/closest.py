@@ -10,6 +10,7 @@ its surface allows: no two places nearer to each other along the members can tou
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -630,7 +631,26 @@ def _stretches(
                     entry["sticking"] = before["sticking"] and entry["sticking"]
                 found.pop()
         found.append({**entry, "at": [begin, end] if end > begin else begin})
+    for one, other in itertools.combinations(found, 2):
+        _join(fields, closest, points[0].contact, one, other)
     return found
+
+
+def _join(fields: Fields, closest: Closest, contact: str, one: dict[str, Any], other: dict[str, Any]) -> None:
+    """Lengthen the entries of two members that lie on an obstacle on both sides of a node up to there."""
+    members = fields.model.scene.members
+    (a, b), nodes = (one["member"], other["member"]), [members[entry["member"]].nodes for entry in (one, other)]
+    for x, y in itertools.product((0, 1), repeat=2) if a != b else ():
+        if nodes[0][x] != nodes[1][y]:
+            continue
+        spans = []
+        for entry, end in ((one, float(x)), (other, float(y))):
+            first, last = np.broadcast_to(entry["at"], 2).tolist()
+            inner = last if end else first
+            if inner != end and not closest.lies(fields, (contact, (entry["member"],)), *sorted((inner, end))):
+                return
+            spans.append([min(first, end), max(last, end)])
+        one["at"], other["at"] = spans
 
 
 def _extent(mesh: Mesh, point: ContactPoint, entry: dict[str, Any]) -> tuple[float, float]:

@@ -28,9 +28,9 @@ __all__ = ["Lines", "Points", "begun", "points_of"]
 
 Points = tuple[ContactPoint, ...]
 
-LINE, SHORT, ROUND = 3, 4.0, 0.2
-"""Number of points of a pair of members from which on it is taken for a line, parts into which that is divided, and
-angle of something round along which a part is at most, rad.
+LINE, SHORT_LINE, SHORT, ROUND = 3, 2, 4.0, 0.2
+"""Number of points of a pair of members from which on it is taken for a line, and where they cannot slide, parts into
+which that is divided, and angle of something round along which a part is at most, rad.
 """
 
 BESIDE, LOCATED = 2, 8.0
@@ -40,6 +40,9 @@ than so many times the accuracy: an eighth of it is the rotation by a force that
 
 MORE = 3
 """Ends of elements beside a line that may become part of it at once."""
+
+LEAST = 1e-2
+"""Gap, over the unit of length, up to which it is looked where it is least."""
 
 ASIDE, AHEAD, ROOM = 4e-6, 0.3, 0.7
 """How far beside the end of a line it is seen how the member bends away, fraction of its length, and share of the room
@@ -157,17 +160,19 @@ class Lines:
 
     # -- from points to lines and back ------------------------------------------------------------
 
-    def lengthened(self, found: Solved) -> tuple[Mesh, Points] | None:
-        """Mesh and points where a pair that touches at many places is taken for a line from now on; None for none."""
+    def lengthened(self, found: Solved, least: int = LINE) -> tuple[Mesh, Points] | None:
+        """Mesh and points where a pair that touches at so many places is taken for a line from now on; None for none."""
         points, mesh = points_of(found), replace(found.model.mesh, points=())
         for key, pair in self.closest.pairs.items():
             own = [p for p in points if p.pair == key and beside_ends(p)]
-            if not self.bends(pair.members[0]):
+            if not own or not self.bends(pair.members[0]):
                 continue
-            if len(own) < LINE if key not in self.keys else not any(point.slides[0] for point in own):
+            places = [point.at[0] for point in own]
+            # What touches at a node touches with all members there.
+            places += [x for x in self._shared(pair, points) if x not in places]
+            if len(places) < least if key not in self.keys else not any(point.slides[0] for point in own):
                 continue
             self.keys |= {key}
-            places = [point.at[0] for point in own]
             longest = self._longest(pair, places)
             low, high = min(places) - longest, max(places) + longest
             mesh = self.divided(mesh, pair, places)
@@ -175,6 +180,13 @@ class Lines:
             others = tuple(point for point in points if point not in own)
             return mesh, (*others, *self.laid(one for one in near if low <= one.at[0] <= high))
         return None
+
+    def _shared(self, pair: Pair, points: Points) -> list[float]:
+        """Ends of the member of a pair on an obstacle that are nodes at which points of other members are."""
+        members = self.scene.members
+        others = [p for p in points if p.contact == pair.contact and len(p.members) == 1 and p.at[0] in (0.0, 1.0)]
+        nodes = {members[p.members[0]].nodes[int(p.at[0])] for p in others}
+        return [x for x, node in zip((0.0, 1.0), members[pair.members[0]].nodes, strict=True) if node in nodes]
 
     def _longest(self, pair: Pair, places: Sequence[float]) -> float:
         """Longest part of the first member of a pair between places of a line, a fraction of its length."""
@@ -231,9 +243,13 @@ class Lines:
                 own |= {cut, cut + (-1 if point.sides[0] else 1)} if spread else {cut}
             last = -2
             for number in sorted(own):
-                if number != last + 1:
+                # Also where nothing presses between: what is flat there may have no weight.
+                if number != last + 1 and not (
+                    last >= 0 and self.closest.lies(found.fields, key, float(cuts[last]), float(cuts[number]))
+                ):
                     stretches.setdefault(key, []).append([])
-                stretches[key][-1].append(float(cuts[number]))
+                    last = number - 1
+                stretches[key][-1] += cuts[last + 1 : number + 1].tolist()
                 last = number
         return stretches
 
@@ -304,10 +320,12 @@ class Lines:
         cut = found.model.mesh.cut_at(member, at)
         before, beyond = float(cuts[cut - 1]) - at, float(cuts[cut + 1]) - at
         ahead = AHEAD * ROOM * (beyond if way > 0 else -before)
-        slope, bends = self.closest.bends(fields, key, at + way * ASIDE)
+        bends = self.closest.bends(fields, key, at + way * ASIDE)[1]
         grows = self.closest.bends(fields, key, at + way * (ASIDE + ahead))[1] - bends
         if way == 0:
-            apart = -slope / (bends * unit * length) if bends > 0.0 else 0.0
+            # Half of the way: where the force goes the gap becomes least elsewhere.
+            least = [near.at[0] for near in self.closest.found(fields, LEAST * unit, [self.closest.pairs[key]])]
+            apart = 0.5 * min((x - at for x in least), key=abs, default=0.0)
         else:
             apart = -way * bends * ahead / grows if grows > 0.0 else 0.0
         # Elements do not become too short: what is in less than one is a point.

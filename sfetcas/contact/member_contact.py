@@ -35,7 +35,7 @@ from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
 from .closest import Closest, Near
 from .gripping import FIRM, Gripping, Placed
-from .lines import FEWEST, Lines, Points, begun, points_of
+from .lines import FEWEST, LINE, SHORT_LINE, Lines, Points, begun, points_of
 
 __all__ = ["MemberContact"]
 
@@ -399,17 +399,29 @@ class MemberContact:
 
     def resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float = 0.0) -> Solved | None:
         """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found."""
+        lines = self.lines.keys
+        found = self._resolved(mesh, points, source, way, drag)
+        if found is None:
+            # What was taken for a line on the way to nothing is none.
+            self.lines.keys = lines
+        return found
+
+    def _resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float) -> Solved | None:
         tried: set[object] = set()
-        since, solved, several = source, False, False
+        since, solved, several, least = source, False, False, LINE
         careful, alone = False, set[object]()
         for _ in range(ROUNDS):
             found = self.solved(mesh, points, source, way, since if drag else None, drag)
             if found is None:
-                if not (solved and several):
+                if solved and several:
+                    # All at once is faster; where that leads nowhere, one after the other.
+                    careful, found = True, source
+                elif solved and least > SHORT_LINE:
+                    # Places between which a member is flat may slide anywhere there.
+                    least, found = SHORT_LINE, source
+                else:
                     return None
-                # All at once is faster; where that leads nowhere, one after the other.
-                careful, found = True, source
-            lined = None if careful else self.lines.lengthened(found)
+            lined = None if careful else self.lines.lengthened(found, least)
             if lined is not None:
                 (mesh, points), several = lined, False
             else:
