@@ -10,7 +10,6 @@ its surface allows: no two places nearer to each other along the members can tou
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -73,8 +72,10 @@ NEXT_TO = 0.95
 NARROW = 1e-3
 """Share of the length of a member over which minima of its distance from an obstacle are one."""
 
-LYING, SAMPLES = 1e-6, 7
-"""Share of the size of the scene up to which a gap between touches is none, and number of places where it is seen."""
+LYING, SAMPLES = (1e-10, 1e-6), 7
+"""Shares of the size of the scene between which that is up to which a gap between touches is none, and number of places
+where it is seen.
+"""
 
 PairKey = tuple[str, tuple[str, ...]]
 """Name of a contact, and the members that touch each other, or the one that touches its obstacle."""
@@ -158,8 +159,8 @@ class Pair:
 class Closest:
     """The search for what is near among the members and obstacles of a scene."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    def __init__(self, scene: Scene, error: float = LYING[1]) -> None:
+        self.scene, self.lying = scene, float(np.clip(error, *LYING)) * scene.size
         pairs: list[Pair] = []
         for name, contact in scene.contacts.items():
             names = [m for m in members_of(contact, scene.members) if scene.members[m].type != "small"]
@@ -290,7 +291,13 @@ class Closest:
     def lies(self, fields: Fields, pair: PairKey, begin: float, end: float) -> bool:
         """Whether a member lies on an obstacle between two fractions of its length."""
         x = np.linspace(begin, end, SAMPLES + 2)[1:-1]
-        return bool(np.abs(self._gaps(fields, self.pairs[pair], x)[0]).max() < LYING * self.scene.size)
+        return bool(np.abs(self._gaps(fields, self.pairs[pair], x)[0]).max() < self.lying)
+
+    def lies_up_to(self, fields: Fields, pair: PairKey, begin: float, end: float) -> bool:
+        """Whether a member lies on an obstacle from a place where it touches up to one of its ends: it does not turn."""
+        slope = self._gaps(fields, self.pairs[pair], np.array([end]))[2]
+        level = abs(float(slope[0])) * self.scene.size < self.lying
+        return level and self.lies(fields, pair, min(begin, end), max(begin, end))
 
     def bends(self, fields: Fields, pair: PairKey, at: float) -> tuple[float, float]:
         """Slope, and curvature in 1/m, of the gap between a place of a member and an obstacle by arc length."""
@@ -572,14 +579,14 @@ def closest_on_pieces(p: Array, p_end: Array, r: Array, r_end: Array) -> tuple[A
     return s, t, np.linalg.norm(w + s[:, None] * d1 - t[:, None] * d2, axis=1)
 
 
-def answers(fields: Fields) -> dict[str, dict[str, Any]]:
+def answers(fields: Fields, error: float | None = None) -> dict[str, dict[str, Any]]:
     """For each contact the ``force`` (3,) N on the member, ``at``, ``gap`` in m, ``member``; lists for several places.
 
-    Between members ``other`` and ``other_at`` are of the second one.  With friction also ``friction`` (3,) N, the part
+    Where gaps are less than the relative ``error`` of positions members lie on obstacles.  Between members ``other`` and ``other_at`` are of the second one.  With friction also ``friction`` (3,) N, the part
     of the force along the surfaces, and whether it is ``sticking``.
     """
     scene, found = fields.model.scene, dict[str, dict[str, Any]]()
-    closest = Closest(scene)
+    closest = Closest(scene, LYING[1] if error is None else error)
     for name, contact in scene.contacts.items():
         points = sorted((p for p in fields.model.mesh.points if p.contact == name), key=lambda p: (p.members, p.at))
         further = ["other", "other_at"] if contact.between_members else []
@@ -631,26 +638,16 @@ def _stretches(
                     entry["sticking"] = before["sticking"] and entry["sticking"]
                 found.pop()
         found.append({**entry, "at": [begin, end] if end > begin else begin})
-    for one, other in itertools.combinations(found, 2):
-        _join(fields, closest, points[0].contact, one, other)
-    return found
+    return [_up_to_ends(fields, closest, points[0].contact, entry) for entry in found]
 
 
-def _join(fields: Fields, closest: Closest, contact: str, one: dict[str, Any], other: dict[str, Any]) -> None:
-    """Lengthen the entries of two members that lie on an obstacle on both sides of a node up to there."""
-    members = fields.model.scene.members
-    (a, b), nodes = (one["member"], other["member"]), [members[entry["member"]].nodes for entry in (one, other)]
-    for x, y in itertools.product((0, 1), repeat=2) if a != b else ():
-        if nodes[0][x] != nodes[1][y]:
-            continue
-        spans = []
-        for entry, end in ((one, float(x)), (other, float(y))):
-            first, last = np.broadcast_to(entry["at"], 2).tolist()
-            inner = last if end else first
-            if inner != end and not closest.lies(fields, (contact, (entry["member"],)), *sorted((inner, end))):
-                return
-            spans.append([min(first, end), max(last, end)])
-        one["at"], other["at"] = spans
+def _up_to_ends(fields: Fields, closest: Closest, contact: str, entry: dict[str, Any]) -> dict[str, Any]:
+    """An entry with its stretch up to the ends of the member, where that lies on the obstacle without a force."""
+    key = contact, (entry["member"],)
+    first, last = np.broadcast_to(entry["at"], 2).tolist()
+    begin = 0.0 if closest.lies_up_to(fields, key, first, 0.0) else first
+    end = 1.0 if closest.lies_up_to(fields, key, last, 1.0) else last
+    return {**entry, "at": [begin, end] if end > begin else begin}
 
 
 def _extent(mesh: Mesh, point: ContactPoint, entry: dict[str, Any]) -> tuple[float, float]:

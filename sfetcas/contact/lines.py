@@ -49,7 +49,10 @@ ASIDE, AHEAD, ROOM = 4e-6, 0.3, 0.7
 that elements have to be moved after which it is seen again; share of an element that is room.
 """
 
-SLENDEREST, FELT = 0.05, 1e-3
+SHARES = 0.2, 3.0
+"""Of how far an end is moved what is missing falls by, between which that is taken for the rest as well."""
+
+SLENDEREST, FELT = 0.05, 1e-5
 """Length of an element beside the end of a line at least, over that of both beside it, and rotation, over the accuracy,
 that the end of a line makes by being elsewhere, below which it stays.
 """
@@ -289,8 +292,14 @@ class Lines:
                     marks[first][near] |= bends > LOCATED * accuracy
         return marks
 
-    def with_moved_ends(self, found: Solved, accuracy: float) -> tuple[Mesh, Points] | None:
-        """Mesh and points where elements end where lines on obstacles do; None where they do well enough."""
+    def with_moved_ends(
+        self, found: Solved, accuracy: float, before: dict[tuple[str, int], tuple[float, float]]
+    ) -> tuple[Mesh, Points] | None:
+        """Mesh and points where elements end where lines on obstacles do; None where they do well enough.
+
+        ``before`` has what was missing at each end of elements the last time, and how far it was moved; of this one
+        then.
+        """
         mesh, moved = found.model.mesh, dict[tuple[str, float], float]()
         for key, stretches in self.stretches(found).items():
             member, follows = key[1][0], self.chosen(key) and key[1][0] not in self.fixed
@@ -298,7 +307,7 @@ class Lines:
             for stretch in stretches if follows else ():
                 for at, way in ((stretch[0], -1), (stretch[-1], 1)):
                     if 0.0 < at < 1.0 and np.abs(breaks - at).min() > SAME_CUT and (member, at) not in moved:
-                        there = self._end(found, key, at, way if len(stretch) > 1 else 0, accuracy)
+                        there = self._end(found, key, at, way if len(stretch) > 1 else 0, accuracy, before)
                         moved |= {} if there == at else {(member, at): there}
         if not moved:
             return None
@@ -309,10 +318,18 @@ class Lines:
         )
         return replace(mesh, cuts=cuts, points=()), points
 
-    def _end(self, found: Solved, key: PairKey, at: float, way: int, accuracy: float) -> float:
+    def _end(
+        self,
+        found: Solved,
+        key: PairKey,
+        at: float,
+        way: int,
+        accuracy: float,
+        known: dict[tuple[str, int], tuple[float, float]],
+    ) -> float:
         """Where a line ends that has its last end of elements at a place, on the side ``way`` of it, 1 or -1.
 
-        Beyond it the curvature of the gap grows evenly, from zero, which it is along the line: the end is where that
+        Beyond it the curvature of the gap grows from zero, which it is along the line: the end is where that
         begins.  What touches alone, ``way`` 0, does so where the gap is least.
         """
         member, fields, unit = key[1][0], found.fields, found.model.scales.length
@@ -320,18 +337,23 @@ class Lines:
         cut = found.model.mesh.cut_at(member, at)
         before, beyond = float(cuts[cut - 1]) - at, float(cuts[cut + 1]) - at
         ahead = AHEAD * ROOM * (beyond if way > 0 else -before)
-        bends = self.closest.bends(fields, key, at + way * ASIDE)[1]
-        grows = self.closest.bends(fields, key, at + way * (ASIDE + ahead))[1] - bends
+        places = ASIDE + ahead * np.array([0.0, 0.5, 1.0])
+        _, grows, bends = np.polyfit(places, [self.closest.bends(fields, key, at + way * x)[1] for x in places], 2)
         if way == 0:
-            # Half of the way: where the force goes the gap becomes least elsewhere.
+            # Half of the way: where the force goes what is nearest goes on.
             least = [near.at[0] for near in self.closest.found(fields, LEAST * unit, [self.closest.pairs[key]])]
             apart = 0.5 * min((x - at for x in least), key=abs, default=0.0)
         else:
-            apart = -way * bends * ahead / grows if grows > 0.0 else 0.0
+            apart = -way * float(bends / grows) if grows > 0.0 else 0.0
+        missing, (former, moved) = apart, known.get((member, cut), (0.0, 0.0))
+        # Where it ends moves on as elements are moved: by secants.
+        if moved and SHARES[0] < (former - missing) / moved < SHARES[1]:
+            apart *= moved / (former - missing)
         # Elements do not become too short: what is in less than one is a point.
         least = SLENDEREST * (beyond - before)
         low, high = max(ROOM * before, min(before + least, 0.0)), min(ROOM * beyond, max(beyond - least, 0.0))
         apart = min(max(apart, low), high)
+        known[member, cut] = missing, apart
         far = abs(apart) * length > accuracy and abs(bends * unit * apart) * length > FELT * accuracy
         return at + apart if far else at
 

@@ -143,7 +143,7 @@ class MemberContact:
         self, scene: Scene, prepare: Callable[[Mesh], Prepared], accuracy: float, fixed: Collection[str]
     ) -> None:
         self.scene, self.prepare, self.fixed = scene, prepare, fixed
-        self.closest = Closest(scene)
+        self.closest = Closest(scene, 0.1 * accuracy)
         radii = min((pair.distance for pair in self.closest.pairs.values() if pair.stop is None), default=np.inf)
         self.tolerance = min(max(0.1 * accuracy, tolerances.CLOSED) * scene.size, ALLOWED * radii)
         self.leaves = scene.analysis.unstable == "leave"

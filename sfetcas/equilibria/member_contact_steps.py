@@ -195,10 +195,11 @@ class MemberContactSteps:
 
     def _with_ends(self, now: Solved, factor: float) -> Solved:
         """The state with elements that end where lines on obstacles do."""
+        before: dict[tuple[str, int], tuple[float, float]] = {}
         for _ in range(ENDS):
             # What touches at single places slides there.
             now = self.run.as_points(now, lambda model: model.loading(factor), 1) or now
-            moved = None if self.meshes.prescribed else self.run.lines.with_moved_ends(now, self.meshes.accuracy)
+            moved = None if self.meshes.prescribed else self.run.lines.with_moved_ends(now, self.meshes.accuracy, before)
             if moved is None:
                 break
             now = self._onto(moved[0], now, factor, moved[1])

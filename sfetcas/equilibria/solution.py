@@ -315,7 +315,9 @@ class Configuration:
         scene = self.model.scene
         if not scene.contacts:
             return {}
-        return closest.answers(self.fields) if scene.touches_at_points else touches.answers(self.fields)
+        if scene.touches_at_points:
+            return closest.answers(self.fields, self.certificate.error_estimate)
+        return touches.answers(self.fields)
 
     def pushes(self, contact: str) -> list[tuple[str, float, Array]]:
         """Where an obstacle pushes: member, fraction of its length, of a stretch its middle, and force (3,), N."""
