@@ -217,8 +217,9 @@ class MemberContactSteps:
         points = run.lines.points_on(mesh, found) if points is None else points
         there = run.resolved(mesh, points, found, lambda model: model.loading(factor))
         if there is None or run.turned(found.fields, there.fields) > NEAR:
-            self.moved.add(factor)
             there = run.relaxed(mesh, found, lambda model: model.loading(factor))
+            if there is not None and run.turned(found.fields, there.fields) > NEAR:
+                self.moved.add(factor)
         if there is None:
             detail = "what touches on a coarse mesh was not found on a finer one"
             raise SolveError(Status.FAILED, detail, found.state)
