@@ -191,14 +191,14 @@ class Closest:
         width = max(radius, NARROW * scene.center_lines[member].length)
         return Pair(name, (member,), radius + stop.sign * stop.radius, width, stop, (first, last))
 
-    def _stiff(self, member: str) -> bool:
+    def stiff(self, member: str) -> bool:
         """Whether a member is straight, and stays so."""
         return self.scene.members[member].type == "rigid" and self.scene.center_lines[member].turning == 0.0
 
     def samples(self, fields: Fields, member: str) -> Array:
         """Fractions (n,) of the length of a member between which it is nearly straight."""
         cuts = fields.model.mesh.cuts[member]
-        if self._stiff(member):
+        if self.stiff(member):
             # What is straight, and stays so, needs no short pieces; between shorter ones fewer may be near.
             return np.linspace(0.0, 1.0, PIECES + 1)
         each = np.diff(cuts) * self.lengths[member] / (SLENDER * self.least[member])
@@ -245,7 +245,7 @@ class Closest:
         for pair in pairs:
             (member,) = pair.members
             # What is straight and rigid is nearest to a plane with an end.
-            ends = pair.stop is not None and pair.stop.kind == "flat" and self._stiff(member)
+            ends = pair.stop is not None and pair.stop.kind == "flat" and self.stiff(member)
             places = x[member][[0, -1]] if ends else x[member]
             gaps = self._gaps(fields, pair, places)[0]
             padded = np.concatenate([[np.inf], gaps, [np.inf]])

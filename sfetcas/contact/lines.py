@@ -49,6 +49,9 @@ ASIDE, AHEAD, ROOM = 4e-6, 0.3, 0.7
 that elements have to be moved after which it is seen again; share of an element that is room.
 """
 
+SLIVER = 0.25
+"""Share of an element up to which its end is moved to a place, rather than that another one is made there."""
+
 SHARES = 0.2, 3.0
 """Of how far an end is moved what is missing falls by, between which that is taken for the rest as well."""
 
@@ -267,6 +270,29 @@ class Lines:
             laid = [p for p in laid if not (self.chosen(key) and all(p.sides)) or p.at[0] in ends]
             points = (*points, *(p for p in laid if (p.at[0], p.sides) not in known))
         return points
+
+    def fitted(self, mesh: Mesh, points: Points, *, prescribed: bool = False) -> Mesh:
+        """A mesh whose elements end where points slide, as members bend otherwise to both sides of a force.
+
+        An end of elements that is near is moved there, else there is one more; never in a ``prescribed`` mesh, of
+        which the nearest is moved.
+        """
+        cuts = dict(mesh.cuts)
+        for point in points:
+            for member, x, slides in zip(point.members, point.at, point.slides, strict=True):
+                if slides and 0.0 < x < 1.0 and not self.closest.stiff(member):
+                    cuts[member] = self._with_end(cuts[member], member, x, prescribed or member in self.fixed)
+        return replace(mesh, cuts=cuts)
+
+    def _with_end(self, cuts: Array, member: str, x: float, keeps: bool) -> Array:
+        """Ends of elements of a member with one at a place; as many as before if it ``keeps`` their number."""
+        near, e = int(np.argmin(np.abs(cuts - x))), int(np.searchsorted(cuts, x))
+        if abs(cuts[near] - x) < SAME_CUT:
+            return cuts
+        moves = np.abs(breaks_of(self.scene, member) - cuts[near]).min() > SAME_CUT
+        if moves and (keeps or abs(cuts[near] - x) < SLIVER * (cuts[e] - cuts[e - 1])):
+            return np.where(np.arange(len(cuts)) == near, x, cuts)
+        return cuts if keeps else np.insert(cuts, e, x)
 
     def rough_ends(self, found: Solved, accuracy: float) -> dict[str, Array]:
         """Marks of the elements, by member, in which lines end and where that is therefore not known well enough.

@@ -502,7 +502,11 @@ class MemberContact:
             slides = tuple(free and x == now for free, x, now in zip(point.slides, at, point.at, strict=True))
             return replace(point, at=at, slides=slides, normal=normal, new=False)
         free = [0.0 < x < 1.0 for x in at]
-        if not all(free):
+        stop = self.closest.pairs[point.pair].stop
+        if stop is not None and stop.kind == "flat" and self.closest.stiff(point.members[0]):
+            # What is straight and rigid touches a plane with its ends.
+            free = [False]
+        elif not all(free):
             slopes = self.closest.slopes(fields, point.pair, at)
             # At an end a point goes inwards where that is nearer; what lies there stays.
             free = [0.0 < x < 1.0 or (0.5 - x) * slope < -LIES for x, slope in zip(at, slopes.tolist(), strict=True)]

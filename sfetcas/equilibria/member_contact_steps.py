@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..contact.contact_statics import refuse_held_inside
-from ..contact.lines import Points
+from ..contact.lines import Points, points_of
 from ..contact.member_contact import MemberContact
 from ..description.inserting import stops_between
 from ..errors import LIMITS, SolveError, Status
@@ -167,7 +167,7 @@ class MemberContactSteps:
                     break
                 now = self._onto(model.mesh.refined(marks, now.fields.kinks), now, factor)
                 continue
-            now = self._with_ends(now, factor)
+            now = self._fitted(self._with_ends(now, factor), factor)
             finer = self._onto(now.model.mesh.refined(None, now.fields.kinks), now, factor)
             difference, error = self.meshes.judged(unjudged(now), unjudged(finer))
             if self.meshes.prescribed:
@@ -192,6 +192,15 @@ class MemberContactSteps:
         answer = finished(now, stability, notes=notes, way=("in contact",), **more)
         refuse_lost_forces(answer)
         return answer
+
+    def _fitted(self, now: Solved, factor: float) -> Solved:
+        """The state with elements that end where points slide; the same where that is not found."""
+        points, run = points_of(now), self.run
+        mesh = run.lines.fitted(now.model.mesh, points, prescribed=self.meshes.prescribed)
+        if all(np.array_equal(mesh.cuts[name], cuts) for name, cuts in now.model.mesh.cuts.items()):
+            return now
+        there = run.resolved(replace(mesh, points=()), points, now, lambda model: model.loading(factor))
+        return now if there is None or run.turned(now.fields, there.fields) > NEAR else there
 
     def _with_ends(self, now: Solved, factor: float) -> Solved:
         """The state with elements that end where lines on obstacles do."""
