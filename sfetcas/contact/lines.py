@@ -49,6 +49,10 @@ ASIDE, AHEAD, ROOM = 4e-6, 0.3, 0.7
 that elements have to be moved after which it is seen again; share of an element that is room.
 """
 
+NEXT = 2e-4
+"""Length of an element, over the unit of length, of which no halves are made: what it yields goes with the cube of that.
+"""
+
 SLIVER = 0.25
 """Share of an element up to which its end is moved to a place, rather than that another one is made there."""
 
@@ -293,6 +297,18 @@ class Lines:
         if moves and (keeps or abs(cuts[near] - x) < SLIVER * (cuts[e] - cuts[e - 1])):
             return np.where(np.arange(len(cuts)) == near, x, cuts)
         return cuts if keeps else np.insert(cuts, e, x)
+
+    def long(self, found: Solved) -> dict[str, Array]:
+        """Marks of the elements, by member, that are not so short that what pushes at both ends is one force.
+
+        Where members lie, two forces nearer to each other do what one does, to rounding.
+        """
+        mesh, unit = found.model.mesh, found.model.scales.length
+        lie = {key[1][0] for key in self.keys}
+        return {
+            name: (np.diff(cuts) * self.scene.center_lines[name].length > NEXT * unit) | (name not in lie)
+            for name, cuts in mesh.cuts.items()
+        }
 
     def rough_ends(self, found: Solved, accuracy: float) -> dict[str, Array]:
         """Marks of the elements, by member, in which lines end and where that is therefore not known well enough.

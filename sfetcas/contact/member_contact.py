@@ -457,7 +457,11 @@ class MemberContact:
         tried.add(key)
         if wrong.any() or more:
             kept = [point for point, off in zip(now, wrong, strict=True) if not off]
-            return (*(self._freed(fields, point) for point in kept), *more), int(wrong.sum()) + len(more)
+            freed = [self._freed(fields, point) for point in kept]
+            # What begins to slide may do away with what penetrates beside it.
+            begins = {point.pair for point, old in zip(freed, kept, strict=True) if point.slides != old.slides}
+            more = tuple(point for point in more if point.pair not in begins)
+            return (*freed, *more), int(wrong.sum()) + len(more) + len(begins)
         kept = self._merged(now, pushes)
         freed = tuple(self._freed(fields, point) for point in kept)
         moved = self.gripping.off_centre(fields, points, now)
@@ -655,9 +659,10 @@ class MemberContact:
         short, near = self.lines.shortened(found, most)
         if not short:
             return None
-        points = [point for point in points_of(found) if point.pair not in short]
-        points += [self._freed(found.fields, begun(one)) for one in near]
         lines, self.lines.keys = self.lines.keys, self.lines.keys - short
+        points = [point for point in points_of(found) if point.pair not in short]
+        # They stay until their force is known, as what begins to touch does.
+        points += [replace(begun(one), normal=self.closest.pairs[one.pair].normal, new=False) for one in near]
         there = self.resolved(replace(found.model.mesh, points=()), tuple(points), found, way)
         if there is None or short & self.lines.keys or self.turned(found.fields, there.fields) > STRIDE:
             self.lines.keys = lines

@@ -154,21 +154,25 @@ class MemberContactSteps:
         if now.model.mesh.order != target.order or self.meshes.fixed:
             mesh = target if self.meshes.fixed else replace(now.model.mesh, order=target.order)
             now = self._onto(mesh, now, factor)
-        smooth, error, lined = np.sqrt(accuracy), np.inf, 0
+        smooth, error, lined, run = np.sqrt(accuracy), np.inf, 0, self.run
         for _ in range(LEVELS):
             if now.model.mesh.elements > lined:
                 pointed, lined = self.run.as_points(now, lambda model: model.loading(factor)), now.model.mesh.elements
                 now = pointed or now
             rough, model = roughness(now.fields) > smooth, now.model
             ends = self.run.lines.rough_ends(now, accuracy)
-            marks = {n: (rough[model.elements_of(n)] | ends[n]) & (n not in self.meshes.fixed) for n in model.members}
+            fine = {n: long & (n not in self.meshes.fixed) for n, long in run.lines.long(now).items()}
+            marks = {n: (rough[model.elements_of(n)] | ends[n]) & fine[n] for n in model.members}
             if any(marked.any() for marked in marks.values()):
                 if model.mesh.elements > MOST_ELEMENTS:
                     break
                 now = self._onto(model.mesh.refined(marks, now.fields.kinks), now, factor)
                 continue
             now = self._fitted(self._with_ends(now, factor), factor)
-            finer = self._onto(now.model.mesh.refined(None, now.fields.kinks), now, factor)
+            marks = run.lines.long(now)
+            if self.meshes.prescribed:
+                marks = {name: np.ones(len(long), bool) for name, long in marks.items()}
+            finer = self._onto(now.model.mesh.refined(marks, now.fields.kinks), now, factor)
             difference, error = self.meshes.judged(unjudged(now), unjudged(finer))
             if self.meshes.prescribed:
                 error += difference
