@@ -154,13 +154,14 @@ def test_wrapping_a_drum_takes_the_curvature_of_the_drum():
     begin, end = step.contacts["drum"]["at"]
     x = np.linspace(begin, end, 9)[1:-1]
     found = step.along("beam", x)
-    np.testing.assert_allclose(found["moment"][:, 2], -1.0 / 0.6, rtol=1e-12)
+    # Curvatures are two derivatives of positions, which are known to 1e-7 of 2 m, over elements of 0.02 m.
+    np.testing.assert_allclose(found["moment"][:, 2], -1.0 / 0.6, rtol=2e-5)
     # Nothing bends suddenly where it begins and ends.
     outside = step.along("beam", [np.nextafter(begin, 0.0), np.nextafter(end, 1.0)])["moment"][:, 2]
-    np.testing.assert_allclose(outside, -1.0 / 0.6, rtol=1e-8)
+    np.testing.assert_allclose(outside, -1.0 / 0.6, rtol=2e-5)
     # Frictionless: the pull along the stretch is the same everywhere.
     pull = np.linalg.norm(found["force"], axis=1)
-    np.testing.assert_allclose(pull, pull[0], rtol=1e-9)
+    np.testing.assert_allclose(pull, pull[0], rtol=1e-5)
     # The stretch is the arc between the places where it begins and ends.
     places = step.along("beam", [begin, end])["position"][:, :2] - [0.5, -0.6]
     angles = np.arctan2(places[:, 1], places[:, 0])
@@ -228,6 +229,8 @@ def end_pushes(touched, touch):
 
 def pushes(step):
     """Forces of all touches along the normals."""
+    if step.model.mesh.points:
+        return np.array([step.fields.contact_point(point)["push"] for point in step.model.mesh.points])
     touched = Touched.of(step.fields)
     found = [touched.push(t) for t in step.model.mesh.touches if t.to is None]
     for touch in step.model.mesh.touches:
@@ -581,10 +584,14 @@ def test_contact_that_cannot_be_satisfied():
     assert found.value.status is Status.INFEASIBLE
 
 
-def test_stretch_on_a_cylinder_in_space_is_refused():
+def test_stretch_on_a_cylinder_in_space_is_that_on_a_circle():
     contact = {"type": "cylinder", "axis": [0, 0, 1], **ROUND, "center": [0.5, -0.6, 0]}
-    with pytest.raises(SolveError, match="found a stretch on a cylinder in space, accepted: stretches on planes"):
-        solve(made(in_space(CASES["wrapped"], contact)))
+    plane, space = (solve(made(t)).last for t in (CASES["wrapped"], in_space(CASES["wrapped"], contact)))
+    one, other = plane.contacts["floor"], space.contacts["floor"]
+    # The accuracy of both is 1e-8 of 2 m; where a force stands is known to the root of what it bends.
+    np.testing.assert_allclose(space.position("B"), plane.position("B"), atol=4e-8)
+    np.testing.assert_allclose(other["force"], one["force"], rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(other["at"], one["at"], atol=1e-5)
 
 
 def test_plane_may_be_given_by_its_other_normal():
@@ -823,10 +830,10 @@ def test_beam_lifts_off_where_a_load_turns_or_pulls_it(load):
 
 def test_hump_over_a_weak_pull_is_that_of_small_deflections():
     """Clamped where it rises, and without moment there: a force P on a beam of weight p opens 1.5 P / p."""
-    pull, heavy = 0.05, 8.0
+    pull, heavy = 0.5, 8.0
     table = lying_in_two(extra={"type": "force", "node": "B", "value": [0, pull]})
     one, two = solve(made(table), accuracy=1e-9).last.contacts["floor"]["at"]
-    # The weight is per length, the members are 1 m long; the hump is 0.0094 m long and 1e-9 m high.
+    # The weight is per length, the members are 1 m long; the hump is 0.094 m long and 1e-5 m high.
     assert (1.0 - one[1], two[0]) == (pytest.approx(0.75 * pull / heavy, rel=1e-4),) * 2
 
 

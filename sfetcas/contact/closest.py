@@ -638,16 +638,19 @@ def _stretches(
                     entry["sticking"] = before["sticking"] and entry["sticking"]
                 found.pop()
         found.append({**entry, "at": [begin, end] if end > begin else begin})
-    return [_up_to_ends(fields, closest, points[0].contact, entry) for entry in found]
+    for end in (0, 1):
+        # Of each member the first one, or the last.
+        for entry in {entry["member"]: entry for entry in (found if end else found[::-1])}.values():
+            _up_to_end(fields, closest, points[0].contact, entry, end)
+    return found
 
 
-def _up_to_ends(fields: Fields, closest: Closest, contact: str, entry: dict[str, Any]) -> dict[str, Any]:
-    """An entry with its stretch up to the ends of the member, where that lies on the obstacle without a force."""
-    key = contact, (entry["member"],)
-    first, last = np.broadcast_to(entry["at"], 2).tolist()
-    begin = 0.0 if closest.lies_up_to(fields, key, first, 0.0) else first
-    end = 1.0 if closest.lies_up_to(fields, key, last, 1.0) else last
-    return {**entry, "at": [begin, end] if end > begin else begin}
+def _up_to_end(fields: Fields, closest: Closest, contact: str, entry: dict[str, Any], end: int) -> None:
+    """Lengthen an entry up to an end of its member, where that lies on the obstacle without a force."""
+    span = np.broadcast_to(entry["at"], 2).tolist()
+    if span[end] != end and closest.lies_up_to(fields, (contact, (entry["member"],)), span[end], float(end)):
+        span[end] = float(end)
+        entry["at"] = span
 
 
 def _extent(mesh: Mesh, point: ContactPoint, entry: dict[str, Any]) -> tuple[float, float]:
