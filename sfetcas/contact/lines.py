@@ -386,7 +386,8 @@ class Lines:
             least = [near.at[0] for near in self.closest.found(fields, LEAST * unit, [self.closest.pairs[key]])]
             apart = 0.5 * min((x - at for x in least), key=abs, default=0.0)
         else:
-            apart = -way * float(bends / grows) if grows > 0.0 else 0.0
+            # Where it does not grow the end is far away: back where the member bends away, else onwards.
+            apart = -way * float(bends / grows) if grows > 0.0 else -way * float(np.sign(bends))
         missing, (former, moved) = apart, known.get((member, cut), (0.0, 0.0))
         # Where it ends moves on as elements are moved: by secants.
         if moved and SHARES[0] < (former - missing) / moved < SHARES[1]:

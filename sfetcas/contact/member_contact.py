@@ -346,6 +346,11 @@ class MemberContact:
         formers = {replace(p, line=former.line).key: former for p, former in now}
         placed = Placed(self.scene, source.fields, target.mesh.points)
         begin = undeformed_vectors(self.scene, target.mesh.points)
+        displaced = dict[str, Array]()
+        for member in {member for point in target.mesh.points for member in point.members}:
+            x = target.mesh.cuts[member]
+            change = source.fields.positions(member, x) - target.scene.center_lines[member].positions(x)
+            displaced[member] = change / unit
         for i, point in enumerate(target.mesh.points):
             moved = source.fields.motion_of(point.contact)
             now_apart = placed.vectors[i] if moved is None else moved[0] @ placed.vectors[i]
@@ -360,7 +365,7 @@ class MemberContact:
                 if free:
                     y[numbers[f"{point.place(side)}, arc length"]] = 0.0
                 else:
-                    self._placed(y, numbers, target, source.fields, point, side)
+                    self._placed(y, numbers, target, displaced, point, side)
             former = formers.get(point.key)
             if former is not None and not point.new:
                 # Of what has become a line, or ceases to be one, the push alone goes on.
@@ -381,21 +386,18 @@ class MemberContact:
 
     @staticmethod
     def _placed(
-        y: Array, numbers: dict[str, int], target: Model, fields: Fields, point: ContactPoint, side: int
+        y: Array, numbers: dict[str, int], target: Model, displaced: dict[str, Array], point: ContactPoint, side: int
     ) -> None:
         """Enter how far ends of elements have moved whose places a point needs, into displacements (n,) by their
         numbers.
         """
         member = point.members[side]
-        cuts = cuts_of_point(target.mesh, point, side)
-        x = target.mesh.cuts[member][cuts]
-        moved = fields.positions(member, x) - target.scene.center_lines[member].positions(x)
-        for cut, change in zip(cuts, moved / target.scales.length, strict=True):
+        for cut in cuts_of_point(target.mesh, point, side):
             place = place_of_cut(target.mesh, target.segments.ends, member, cut)
             for k, axis in enumerate("xyz"[: target.element.axes]):
                 number = numbers.get(f"{place}.{axis}")
                 if number is not None:
-                    y[number] = change[k]
+                    y[number] = displaced[member][cut, k]
 
     def resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float = 0.0) -> Solved | None:
         """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found."""

@@ -173,6 +173,10 @@ def with_sharing(
 
     Unchanged if the relative residual would exceed ``tolerance``.  ``reactions`` is passed on.
     """
+    if equations.model.mesh.points and equations.redundant is False:
+        # Rows of places beside each other are redundant to rounding only: of what touches they have been looked for
+        # without contact.
+        return state, point
     loose = loose_rows(equations, point)
     # The first state may have been a bent one, where no row is redundant.
     equations.redundant = equations.redundant or bool(loose.size)
