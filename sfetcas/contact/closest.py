@@ -294,7 +294,7 @@ class Closest:
         return bool(np.abs(self._gaps(fields, self.pairs[pair], x)[0]).max() < self.lying)
 
     def lies_up_to(self, fields: Fields, pair: PairKey, begin: float, end: float) -> bool:
-        """Whether a member lies on an obstacle from a place where it touches up to one of its ends: it does not turn."""
+        """Whether a member lies on an obstacle from a place where it touches up to an end of it: it does not turn."""
         slope = self._gaps(fields, self.pairs[pair], np.array([end]))[2]
         level = abs(float(slope[0])) * self.scene.size < self.lying
         return level and self.lies(fields, pair, min(begin, end), max(begin, end))
@@ -582,8 +582,9 @@ def closest_on_pieces(p: Array, p_end: Array, r: Array, r_end: Array) -> tuple[A
 def answers(fields: Fields, error: float | None = None) -> dict[str, dict[str, Any]]:
     """For each contact the ``force`` (3,) N on the member, ``at``, ``gap`` in m, ``member``; lists for several places.
 
-    Where gaps are less than the relative ``error`` of positions members lie on obstacles.  Between members ``other`` and ``other_at`` are of the second one.  With friction also ``friction`` (3,) N, the part
-    of the force along the surfaces, and whether it is ``sticking``.
+    Where gaps are less than the relative ``error`` of positions members lie on obstacles.  Between members ``other``
+    and ``other_at`` are of the second one.  With friction also ``friction`` (3,) N, the part of the force along the
+    surfaces, and whether it is ``sticking``.
     """
     scene, found = fields.model.scene, dict[str, dict[str, Any]]()
     closest = Closest(scene, LYING[1] if error is None else error)

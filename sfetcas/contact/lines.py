@@ -50,8 +50,7 @@ that elements have to be moved after which it is seen again; share of an element
 """
 
 NEXT = 2e-4
-"""Length of an element, over the unit of length, of which no halves are made: what it yields goes with the cube of that.
-"""
+"""Length of an element, over the unit of length, of which no halves are made: what it yields goes with its cube."""
 
 SLIVER = 0.25
 """Share of an element up to which its end is moved to a place, rather than that another one is made there."""
@@ -171,7 +170,7 @@ class Lines:
     # -- from points to lines and back ------------------------------------------------------------
 
     def lengthened(self, found: Solved, least: int = LINE) -> tuple[Mesh, Points] | None:
-        """Mesh and points where a pair that touches at so many places is taken for a line from now on; None for none."""
+        """Mesh and points where a pair that touches at so many places is a line from now on; None for none."""
         points, mesh = points_of(found), replace(found.model.mesh, points=())
         for key, pair in self.closest.pairs.items():
             own = [p for p in points if p.pair == key and beside_ends(p)]
@@ -383,8 +382,8 @@ class Lines:
         _, grows, bends = np.polyfit(places, [self.closest.bends(fields, key, at + way * x)[1] for x in places], 2)
         if way == 0:
             # Half of the way: where the force goes what is nearest goes on.
-            least = [near.at[0] for near in self.closest.found(fields, LEAST * unit, [self.closest.pairs[key]])]
-            apart = 0.5 * min((x - at for x in least), key=abs, default=0.0)
+            nearest = [near.at[0] for near in self.closest.found(fields, LEAST * unit, [self.closest.pairs[key]])]
+            apart = 0.5 * min((x - at for x in nearest), key=abs, default=0.0)
         else:
             # Where it does not grow the end is far away: back where the member bends away, else onwards.
             apart = -way * float(bends / grows) if grows > 0.0 else -way * float(np.sign(bends))

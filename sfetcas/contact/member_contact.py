@@ -459,11 +459,11 @@ class MemberContact:
         tried.add(key)
         if wrong.any() or more:
             kept = [point for point, off in zip(now, wrong, strict=True) if not off]
-            freed = [self._freed(fields, point) for point in kept]
+            slid = tuple(self._freed(fields, point) for point in kept)
             # What begins to slide may do away with what penetrates beside it.
-            begins = {point.pair for point, old in zip(freed, kept, strict=True) if point.slides != old.slides}
+            begins = {point.pair for point, old in zip(slid, kept, strict=True) if point.slides != old.slides}
             more = tuple(point for point in more if point.pair not in begins)
-            return (*freed, *more), int(wrong.sum()) + len(more) + len(begins)
+            return (*slid, *more), int(wrong.sum()) + len(more) + len(begins)
         kept = self._merged(now, pushes)
         freed = tuple(self._freed(fields, point) for point in kept)
         moved = self.gripping.off_centre(fields, points, now)
@@ -657,7 +657,7 @@ class MemberContact:
         return found
 
     def as_points(self, found: Solved, way: Way, most: int = FEWEST) -> Solved | None:
-        """The state with lines on obstacles of at most so many ends of elements as points; None where they are lines."""
+        """The state with lines on obstacles of at most so many ends of elements as points; None where they are none."""
         short, near = self.lines.shortened(found, most)
         if not short:
             return None

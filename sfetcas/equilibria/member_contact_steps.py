@@ -212,7 +212,9 @@ class MemberContactSteps:
         for _ in range(ENDS):
             # What touches at single places slides there.
             now = self.run.as_points(now, lambda model: model.loading(factor), 1) or now
-            moved = None if self.meshes.prescribed else self.run.lines.with_moved_ends(now, self.meshes.accuracy, before)
+            moved = (
+                None if self.meshes.prescribed else self.run.lines.with_moved_ends(now, self.meshes.accuracy, before)
+            )
             if moved is None:
                 break
             now = self._onto(moved[0], now, factor, moved[1])

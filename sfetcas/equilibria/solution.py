@@ -304,6 +304,11 @@ class Configuration:
             places = places[np.unique(np.linspace(0, len(places) - 1, MOST_PLACES).round().astype(int))]
         return places
 
+    @property
+    def closeness(self) -> float | None:
+        """Estimated error of the positions over the size of the scene; None where there is no estimate."""
+        return None
+
     @functools.cached_property
     def contacts(self) -> dict[str, dict[str, Any]]:
         """For each contact of the scene: ``force`` (3,) N on the member, ``at``, ``gap`` in m, ``member``.
@@ -316,7 +321,7 @@ class Configuration:
         if not scene.contacts:
             return {}
         if scene.touches_at_points:
-            return closest.answers(self.fields, self.certificate.error_estimate)
+            return closest.answers(self.fields, self.closeness)
         return touches.answers(self.fields)
 
     def pushes(self, contact: str) -> list[tuple[str, float, Array]]:
@@ -456,6 +461,11 @@ class Equilibrium(Configuration):
     @property
     def _energies(self) -> tuple[float, float]:
         return self.strain, self.potential - self.strain
+
+    @property
+    def closeness(self) -> float | None:
+        """Estimated error of the positions over the size of the scene; None where there is no such estimate."""
+        return None if self.certificate.error_of else self.certificate.error_estimate
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
         """As :meth:`.Configuration.table`; also for the kind ``certificate``."""
