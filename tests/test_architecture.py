@@ -172,6 +172,7 @@ ORDER = [
     "contact.nearby",
     "contact.gripping",
     "contact.lines",
+    "contact.edges",
     "contact.member_contact",
     "contact.touches",
     "contact.settling",

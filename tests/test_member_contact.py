@@ -203,10 +203,6 @@ def test_wrong_input_is_told_in_one_sentence(contact, sentence):
 
 
 def test_what_contact_between_members_is_not_for():
-    edge = {"type": "point", "position": [0.5, -1], "side": [0, 1], "members": "all"}
-    pair = {"type": "members", "members": "all", "radius": 0.01}
-    with pytest.raises(SceneError, match="beside the edge 'edge'"):
-        leaves(contacts={"pair": pair, "edge": edge})
     with pytest.raises(SceneError, match="accepted: with 'static'"):
         leaves(analysis={"type": "path", "range": [0, 1]})
 

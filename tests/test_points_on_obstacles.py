@@ -141,7 +141,6 @@ def test_members_and_obstacles_together():
         (FLOOR | {"member_radius": "wide"}, {}, "member_radius"),
         (FLOOR | {"member_radius": 0.4}, {}, r"starts inside, by 0\.1 m"),
         (FLOOR | {"member_radius": 0.1}, {"analysis": {"type": "path", "range": [0, 1]}}, "accepted: with 'static'"),
-        ({"type": "point", "position": [0.5, -1], "side": [0, 1], "member_radius": 0.1}, {}, "member_radius"),
     ],
 )
 def test_wrong_input_is_told_in_one_sentence(contact, more, sentence):

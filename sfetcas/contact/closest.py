@@ -10,15 +10,16 @@ its surface allows: no two places nearer to each other along the members can tou
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from .. import tolerances
 from ..description.contacts import contact_radius, pairs_of
-from ..description.obstacles import Obstacle, members_of, takes_part
+from ..description.obstacles import Obstacle, edge_side, members_of, takes_part
 from ..description.scene import Scene
 from ..mathematics.arrays import TINY, Array, Index
 from ..mechanics.fields import Fields
@@ -26,6 +27,7 @@ from ..mechanics.mesh import ContactPoint, Mesh
 from ..mechanics.segments import standing, stations_of_line
 
 __all__ = [
+    "BEHIND_EDGE",
     "NEXT_TO",
     "SAME",
     "Closest",
@@ -72,6 +74,9 @@ NEXT_TO = 0.95
 NARROW = 1e-3
 """Share of the length of a member over which minima of its distance from an obstacle are one."""
 
+BEHIND_EDGE = 0.2
+"""Distance behind an edge from which a member is not in contact with it, share of the size of the scene."""
+
 LYING, SAMPLES = (1e-10, 1e-6), 7
 """Shares of the size of the scene between which that is up to which a gap between touches is none, and number of places
 where it is seen.
@@ -95,7 +100,7 @@ class Near:
         Unit vector from the second centre line, or the obstacle, to the first, as an obstacle that moves sees it.
     gap : float
         Distance of the surfaces, m; below zero where they penetrate.
-    distance : float
+    distance, edge : float
         As of :class:`~sfetcas.mechanics.mesh.ContactPoint`.
     """
 
@@ -105,6 +110,7 @@ class Near:
     normal: Array
     gap: float
     distance: float
+    edge: float = 0.0
 
     @property
     def pair(self) -> PairKey:
@@ -128,6 +134,8 @@ class Pair:
         It is where it is in the undeformed scene: of one that moves what touches it is seen from it.
     ends : (bool, bool)
         Whether an obstacle can push the ends of the member.
+    edge : float
+        As of :class:`~sfetcas.mechanics.mesh.ContactPoint`.
     """
 
     contact: str
@@ -136,11 +144,19 @@ class Pair:
     width: float
     stop: Obstacle | None = None
     ends: tuple[bool, bool] = (True, True)
+    edge: float = 0.0
 
     @property
     def key(self) -> PairKey:
         """Its name."""
         return self.contact, self.members
+
+    @property
+    def turn(self) -> float:
+        """Radius of what a member may be bent round, m: of an obstacle, or of its own surface on an edge."""
+        if self.stop is None or self.stop.kind != "round":
+            return np.inf
+        return self.stop.radius or self.distance
 
     @property
     def passable(self) -> bool:
@@ -157,7 +173,14 @@ class Pair:
 
 
 class Closest:
-    """The search for what is near among the members and obstacles of a scene."""
+    """The search for what is near among the members and obstacles of a scene.
+
+    Attributes
+    ----------
+    sides : dict
+        Of each edge and member the side where that is: 1, -1, or zero, where it may be on either; at first as the scene
+        says.
+    """
 
     def __init__(self, scene: Scene, error: float = LYING[1]) -> None:
         self.scene, self.lying = scene, float(np.clip(error, *LYING)) * scene.size
@@ -173,13 +196,17 @@ class Closest:
             else:
                 pairs += [self._against(name, member) for member in names]
         self.pairs = {pair.key: pair for pair in pairs}
+        self.sides = {pair.key: pair.edge for pair in pairs if pair.edge}
+        # A state is looked at as the end of a step, and as the begin of another one.
+        self._passing = weakref.WeakKeyDictionary[Fields, dict[PairKey, tuple[Array, Array, Array]]]()
+        self._courses = weakref.WeakKeyDictionary[Fields, dict[str, tuple[Array, Array, Array]]]()
         self._between = [pair for pair in pairs if pair.stop is None]
         self.members = sorted({member for pair in pairs for member in pair.members})
         self._tree_members = sorted({member for pair in self._between for member in pair.members})
         self.lengths = {member: scene.center_lines[member].length for member in self.members}
         self.least = dict.fromkeys(self.members, np.inf)
         for pair in pairs:
-            size = 0.5 * pair.distance if pair.stop is None else pair.stop.radius or np.inf
+            size = 0.5 * pair.distance if pair.stop is None else pair.turn
             self.least |= {member: min(self.least[member], size) for member in pair.members}
         self.largest = max((pair.distance for pair in self._between), default=0.0)
 
@@ -189,7 +216,9 @@ class Closest:
         radius, nodes = scene.contacts[name].member_radius, scene.members[member].nodes
         first, last = (takes_part(node, scene.nodes[node], scene.motions.values(), stop) for node in nodes)
         width = max(radius, NARROW * scene.center_lines[member].length)
-        return Pair(name, (member,), radius + stop.sign * stop.radius, width, stop, (first, last))
+        line = scene.center_lines[member]
+        edge = edge_side(stop, line.positions, line.tangents) if stop.kind == "sharp" else 0.0
+        return Pair(name, (member,), radius + stop.sign * stop.radius, width, stop, (first, last), edge)
 
     def stiff(self, member: str) -> bool:
         """Whether a member is straight, and stays so."""
@@ -227,8 +256,12 @@ class Closest:
         """Smallest distance of the surfaces of a contact, m; None of members that are nowhere near to each other."""
         pairs = [pair for pair in self.pairs.values() if pair.contact == contact]
         if not self.scene.contacts[contact].between_members:
-            ends = [float(self._gaps(fields, pair, np.array([0.0, 1.0]))[0].min()) for pair in pairs]
-            return min([*ends, *(one.gap for one in self.found(fields, np.inf, pairs))], default=None)
+            # An edge that is before or beyond a member has no distance from it.
+            along = [pair for pair in pairs if not pair.edge]
+            ends = [float(self._gaps(fields, pair, np.array([0.0, 1.0]))[0].min()) for pair in along]
+            # What has slid off an edge may be behind it.
+            near = (abs(one.gap) if one.edge else one.gap for one in self.found(fields, np.inf, pairs))
+            return min([*ends, *near], default=None)
         # Far fewer are near than would be looked at all at once.
         reach = self.largest
         while reach < 2.0 * NEARBY * self.scene.size:
@@ -244,6 +277,9 @@ class Closest:
         found, nodes = list[Near](), set[tuple[str, str]]()
         for pair in pairs:
             (member,) = pair.members
+            if pair.edge:
+                found += self._over_edge(fields, pair, reach, nodes)
+                continue
             # What is straight and rigid is nearest to a plane with an end.
             ends = pair.stop is not None and pair.stop.kind == "flat" and self.stiff(member)
             places = x[member][[0, -1]] if ends else x[member]
@@ -261,16 +297,55 @@ class Closest:
             low, high = places[np.maximum(i - 1, 0)], places[np.minimum(i + 1, len(places) - 1)]
             at = places[i] if ends else self._least(fields, pair, low, places[i], high)
             gaps, normals, *_ = self._gaps(fields, pair, at)
-            for s, gap, normal in zip(at.tolist(), gaps.tolist(), normals, strict=True):
-                if gap >= reach:
-                    continue
-                if s in (0.0, 1.0):
-                    end = pair.contact, self.scene.members[member].nodes[int(s)]
-                    if not pair.ends[int(s)] or end in nodes:
-                        continue
-                    nodes.add(end)
-                found.append(Near(pair.contact, pair.members, (s,), normal, gap, pair.distance))
+            found += self._once(pair, at, gaps, normals, reach, nodes)
         return found
+
+    def _once(
+        self, pair: Pair, at: Array, gaps: Array, normals: Array, reach: float, nodes: set[tuple[str, str]]
+    ) -> Iterator[Near]:
+        """Minima that are near enough, at nodes that are none of those known, which are told of."""
+        for s, gap, normal in zip(at.tolist(), gaps.tolist(), normals, strict=True):
+            if gap >= reach:
+                continue
+            if s in (0.0, 1.0):
+                end = pair.contact, self.scene.members[pair.members[0]].nodes[int(s)]
+                if not pair.ends[int(s)] or end in nodes:
+                    continue
+                nodes.add(end)
+            yield Near(pair.contact, pair.members, (s,), normal, gap, pair.distance)
+
+    def course(self, fields: Fields, member: str) -> tuple[Array, Array, Array]:
+        """Fractions (n,) of the length of a member, and positions (n, 3), m, and slopes (n, 3) there."""
+        known = self._courses.setdefault(fields, {})
+        if member not in known:
+            x = self.samples(fields, member)
+            known[member] = x, fields.positions(member, x), fields.slopes(member, x)
+        return known[member]
+
+    def _passes(self, fields: Fields, pair: Pair) -> tuple[Array, Array, Array]:
+        """Where a member passes an edge, (n,), and gaps (n,), m, and normals (n, 3) there, for the side 1."""
+        known = self._passing.setdefault(fields, {})
+        if pair.key not in known:
+            (member,), stop = pair.members, pair.stop
+            assert stop is not None
+            x, places, tangents = self.course(fields, member)
+            slope = np.einsum("ni,ni->n", (places - stop.place) @ stop.across, tangents)
+            before = slope <= LEVEL * self.scene.size
+            i = np.flatnonzero(before[:-1] & ~before[1:])
+            low, high = x[i], x[i + 1]
+            at = self._least(fields, pair, low, low - slope[i] / (slope[i + 1] - slope[i]) * (high - low), high)
+            known[pair.key] = (at, *self._gaps(fields, pair, at)[:2])
+        return known[pair.key]
+
+    def _over_edge(self, fields: Fields, pair: Pair, reach: float, nodes: set[tuple[str, str]]) -> Iterator[Near]:
+        """Where a member passes an edge that it is not far behind."""
+        at, gaps, normals = self._passes(fields, pair)
+        side = self.sides[pair.key]
+        sides = np.copysign(1.0, gaps) if side == 0.0 else np.full(len(gaps), side)
+        gaps, normals = sides * gaps, sides[:, None] * normals
+        beside = gaps > -BEHIND_EDGE * self.scene.size
+        for near in self._once(pair, at[beside], gaps[beside], normals[beside], reach, nodes):
+            yield replace(near, edge=float(sides[at == near.at[0]][0]))
 
     def _least(self, fields: Fields, pair: Pair, low: Array, at: Array, high: Array) -> Array:
         """Places (n,) of the minima between others."""
@@ -291,6 +366,8 @@ class Closest:
     def lies(self, fields: Fields, pair: PairKey, begin: float, end: float) -> bool:
         """Whether a member lies on an obstacle between two fractions of its length."""
         x = np.linspace(begin, end, SAMPLES + 2)[1:-1]
+        if self.pairs[pair].edge:
+            return False
         return bool(np.abs(self._gaps(fields, self.pairs[pair], x)[0]).max() < self.lying)
 
     def lies_up_to(self, fields: Fields, pair: PairKey, begin: float, end: float) -> bool:
@@ -306,7 +383,8 @@ class Closest:
 
     def _gaps(self, fields: Fields, pair: Pair, x: Array) -> tuple[Array, Array, Array, Array]:
         """Of places (n,) of the member gaps (n,), m, normals (n, 3), and slopes (n,) and curvatures (n,), 1/m, of the
-        gap by arc length.
+        gap by arc length; at an edge, which members may be at, gaps and normals for the side 1, and slopes, m, and
+        curvatures of half the square of the distance.
         """
         (member,), stop = pair.members, pair.stop
         assert stop is not None
@@ -314,9 +392,11 @@ class Closest:
         _, bent = fields.seen(pair.contact, places, self._curvature(fields, member, x))
         out = (places - stop.place) @ stop.across
         normals = stop.normals(out + stop.place, tangent)
-        slope = np.einsum("ni,ni->n", normals, tangent)
-        curvature = np.einsum("ni,ni->n", normals, bent)
         gaps = np.einsum("ni,ni->n", out, normals) - pair.distance
+        towards = out if pair.edge else normals
+        slope, curvature = np.einsum("ni,ni->n", towards, tangent), np.einsum("ni,ni->n", towards, bent)
+        if pair.edge:
+            return gaps, normals, slope, curvature + np.einsum("ni,ni->n", tangent @ stop.across, tangent)
         if stop.kind == "round":
             along = np.einsum("ni,ni->n", tangent @ stop.across, tangent)
             apart = np.maximum(np.linalg.norm(out, axis=1), TINY)
@@ -615,7 +695,7 @@ def _entry(fields: Fields, point: ContactPoint) -> dict[str, Any]:
         return {**entry, "gap": gap, "other": point.members[1], "other_at": told["at"][1]}
     stop = fields.model.scene.obstacles[point.contact]
     seen = fields.seen(point.contact, places[0][None], fields.tangents(point.members[0], np.array(told["at"])))
-    gap = stop.gaps(*seen)[0]
+    gap = stop.gaps(*seen, way=point.edge or 1.0)[0]
     return {**entry, "gap": float(gap) - fields.model.scene.contacts[point.contact].member_radius}
 
 

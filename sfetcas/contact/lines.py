@@ -174,7 +174,7 @@ class Lines:
         points, mesh = points_of(found), replace(found.model.mesh, points=())
         for key, pair in self.closest.pairs.items():
             own = [p for p in points if p.pair == key and beside_ends(p)]
-            if not own or not self.bends(pair.members[0]):
+            if not own or pair.edge or not self.bends(pair.members[0]):
                 continue
             places = [point.at[0] for point in own]
             # What touches at a node touches with all members there.
@@ -200,8 +200,8 @@ class Lines:
     def _longest(self, pair: Pair, places: Sequence[float]) -> float:
         """Longest part of the first member of a pair between places of a line, a fraction of its length."""
         length = self.closest.lengths[pair.members[0]]
-        turn = np.inf if pair.stop is None or not pair.stop.radius else ROUND * pair.stop.radius / length
-        return float(min(max((max(places) - min(places)) / SHORT, 0.5 * pair.width / length), turn)) * self.finer
+        longest = max((max(places) - min(places)) / SHORT, 0.5 * pair.width / length)
+        return float(min(longest, ROUND * pair.turn / length)) * self.finer
 
     def divided(self, mesh: Mesh, pair: Pair, places: Sequence[float]) -> Mesh:
         """A mesh with elements of the first member that are not too long near the places of a line."""
@@ -418,4 +418,7 @@ def begun(near: Near) -> ContactPoint:
     """A point that begins where surfaces are nearest to each other."""
     x, y, z = near.normal.tolist()
     still = (False,) * len(near.at)
-    return ContactPoint(near.contact, near.members, near.at, still, near.distance, normal=(x, y, z), new=True)
+    normal = (x, y, z)
+    return ContactPoint(
+        near.contact, near.members, near.at, still, near.distance, normal=normal, new=True, edge=near.edge
+    )

@@ -34,6 +34,7 @@ from ..solvers.one_sided import OneSided
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
 from .closest import Closest, Near
+from .edges import Edges
 from .gripping import FIRM, Gripping, Placed
 from .lines import FEWEST, LINE, SHORT_LINE, Lines, Points, begun, points_of
 
@@ -137,6 +138,7 @@ class MemberContact:
         As ``STRIDE``, ``FIRST`` and ``ROUGH``.
     lines : Lines
         The lines along which members touch.
+    edges : Edges
     """
 
     def __init__(
@@ -153,6 +155,7 @@ class MemberContact:
         self.redundant: bool | None = None
         self.lines = Lines(scene, self.closest, fixed)
         self.falls = 0
+        self.edges = Edges(scene, self.closest, self.tolerance)
 
     # -- begin ------------------------------------------------------------------------------------
 
@@ -185,14 +188,16 @@ class MemberContact:
 
     def unstopped(self, before: Solved, after: Solved) -> bool:
         """Whether members neither penetrate nor pass each other from one state to another."""
+        self.edges.begin(before.fields)
         return self.clear(after.fields) and not self.passed(before.fields, after.fields)
 
     def lying(self, start: Solved) -> Solved:
         """An undeformed state with the points where members lie on obstacles."""
         fields, close, mesh = start.fields, tolerances.CLOSED * self.scene.size, start.model.mesh
+        self.edges.reset()
         on = [pair for pair in self.closest.pairs.values() if pair.stop is not None]
         found = {(near.pair, near.at): near for near in self.closest.found(fields, close, on)}
-        for pair in on:
+        for pair in (pair for pair in on if not pair.edge):
             (member,) = pair.members
             cuts = mesh.cuts[member]
             # What is rigid touches with its ends, or where it is curved.
@@ -278,7 +283,7 @@ class MemberContact:
 
     def _known(self, point: ContactPoint) -> ContactPoint:
         """A point that stays where it is, the gap of which is measured where it is now."""
-        return replace(point, normal=self.closest.pairs[point.pair].normal, new=False)
+        return point if point.edge else replace(point, normal=self.closest.pairs[point.pair].normal, new=False)
 
     def _softly(
         self, mesh: Mesh, points: list[ContactPoint], source: Solved, way: Way, since: Solved | None, drag: float
@@ -370,9 +375,11 @@ class MemberContact:
             if former is not None and not point.new:
                 # Of what has become a line, or ceases to be one, the push alone goes on.
                 same = former.line == point.line
-                for one, other in zip(former.rows(axes)[::-1], point.rows(axes)[::-1], strict=same):
-                    if same or (one.endswith("gap") and other.endswith("gap")):
-                        lam[rows[other]] = source.state.lam[known[one]]
+                had_rows = {row.removeprefix(former.name): known[row] for row in former.rows(axes)}
+                for row in point.rows(axes):
+                    what = row.removeprefix(point.name)
+                    if what in had_rows and (same or what.endswith("gap")):
+                        lam[rows[row]] = source.state.lam[had_rows[what]]
                 if point.grip is not None and former.grip is not None:
                     shares = ("across", "along", "along too")[:axes]
                     force = source.state.y[[had[f"{former.pressed}, {share}"] for share in shares]]
@@ -411,6 +418,7 @@ class MemberContact:
     def _resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float) -> Solved | None:
         tried: set[object] = set()
         since, solved, several, least = source, False, False, LINE
+        self.edges.begin(source.fields)
         careful, alone = False, set[object]()
         for _ in range(ROUNDS):
             found = self.solved(mesh, points, source, way, since if drag else None, drag)
@@ -465,7 +473,7 @@ class MemberContact:
             more = tuple(point for point in more if point.pair not in begins)
             return (*slid, *more), int(wrong.sum()) + len(more) + len(begins)
         kept = self._merged(now, pushes)
-        freed = tuple(self._freed(fields, point) for point in kept)
+        freed = self.edges.joined(tuple(self._freed(fields, point) for point in kept))
         moved = self.gripping.off_centre(fields, points, now)
         return freed, int(moved or freed != tuple(now))
 
@@ -473,6 +481,8 @@ class MemberContact:
         """Whether points, where they are now, are where nothing is nearest, or would have to pull."""
         lost = np.array([self._lost(found.fields, point) for point in now], dtype=bool)
         rounding = LASTING * np.abs(pushes).max(initial=0.0)
+        # A corner on an edge is pushed between two normals.
+        pushes = np.where([point.met and not any(point.slides) for point in now], 0.0, pushes)
         # Along a line what does not push is left; what slides there may have to stay until it is known.
         wrong = lost | (pushes < -rounding - 1e-12 * found.model.scales.force)
         wrong |= np.array([self.lines.has(p) and not self.lines.chosen(p.pair) for p in now], dtype=bool) & (
@@ -483,6 +493,8 @@ class MemberContact:
 
     def _lost(self, fields: Fields, point: ContactPoint) -> bool:
         """Whether a point is where members are not nearest: where it does not push, nothing else keeps it there."""
+        if point.edge:
+            return self.edges.left(fields, point)
         if not any(point.slides) or not all(0.0 <= x <= 1.0 for x in point.at):
             return False
         slopes = self.closest.slopes(fields, point.pair, point.at)
@@ -498,10 +510,14 @@ class MemberContact:
         return [point for point in points if point in kept]
 
     def _same(self, point: ContactPoint | Near, other: ContactPoint, share: float = 0.2) -> bool:
-        return point.pair == other.pair and self.closest.alike(point.pair, point.at, other.at, share)
+        # What is new on an edge slides by more than its width.
+        near = bool(other.edge) and other.new
+        return point.pair == other.pair and (near or self.closest.alike(point.pair, point.at, other.at, share))
 
     def _freed(self, fields: Fields, point: ContactPoint) -> ContactPoint:
         """A point as it slides from where it is, though not beyond ends; along a line it stays on the first member."""
+        if point.edge:
+            return self.edges.freed(fields, point)
         normal = self.closest.pairs[point.pair].normal
         at = tuple(min(max(x, 0.0), 1.0) for x in point.at)
         if at != point.at:
@@ -523,7 +539,7 @@ class MemberContact:
     def _penetrating(self, fields: Fields, points: list[ContactPoint]) -> Points:
         """New points where members penetrate each other, the deepest first."""
         found = self.lines.deepest(fields, points, self.tolerance)
-        ends = {end for point in points if point.line for end in self._ends(point)}
+        ends = {end for point in points if point.line or point.edge for end in self._ends(point)}
         for one in self.closest.found(fields, 0.0):
             deep = one.gap < -self.tolerance and not self.lines.has(one) and not ends.intersection(self._ends(one))
             if deep and not any(self._same(one, point) for point in points if not self.lines.has(point)):
@@ -553,7 +569,9 @@ class MemberContact:
                 moved = max(moved, float(np.linalg.norm(one - other, axis=1).max()))
         found = self.closest.found(before, 2.0 * moved, pairs)
         vectors = Placed(self.scene, after, found).vectors
-        return [near for near, vector in zip(found, vectors, strict=True) if near.normal @ vector <= 0.0]
+        crossed = [near for near, vector in zip(found, vectors, strict=True) if near.normal @ vector <= 0.0]
+        turned = self.turned(before, after) if self.edges.pairs else 0.0
+        return crossed + self.edges.crossed(before, after, turned)
 
     def turned(self, before: Fields, after: Fields) -> float:
         """Largest angle between tangents of the same place in two states, rad."""

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from .. import tolerances
-from ..description.obstacles import members_of, nearest, takes_part
+from ..description.obstacles import edge_side, members_of, nearest, takes_part
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, unit
 from ..mechanics.equations import Equations, State
@@ -25,6 +25,7 @@ from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Spot, Touch
 from ..mechanics.rotations import STIFF, end_joints
+from .closest import BEHIND_EDGE
 
 __all__ = ["COARSE", "MOST_RISE", "NOISE", "Gap", "Loose", "Opened", "Touched", "answers", "edge_sides"]
 
@@ -43,9 +44,6 @@ to its neighbours: to 6e-8 of itself, a gap within rounding."""
 
 FIRST_RISE, MOST_RISE = 0.05, 0.9
 """Part of a stretch that is assumed to rise if there is no estimate, and largest part; shares of its length."""
-
-BEHIND_EDGE = 0.2
-"""Distance behind an edge from which a member is not in contact with it, share of the size of the scene."""
 
 SAMPLES = 12
 """Number of places in each element at which gaps are computed."""
@@ -123,10 +121,8 @@ def edge_sides(scene: Scene) -> dict[tuple[str, str], float]:
         if stop.side is None:
             continue
         for member in members_of(scene.contacts[name], scene.members):
-            line, x = scene.center_lines[member], np.linspace(0.0, 1.0, 257)
-            near = np.argmin(np.linalg.norm((line.positions(x) - stop.place) @ stop.across, axis=1))
-            normal = np.cross(stop.normal, line.tangents(x[near : near + 1])[0])
-            found[name, member] = 1.0 if normal @ stop.side >= 0.0 else -1.0
+            line = scene.center_lines[member]
+            found[name, member] = edge_side(stop, line.positions, line.tangents)
     return found
 
 

@@ -18,8 +18,8 @@ from .structure import Member
 __all__ = ["Contact", "contact_radius", "pairs_of"]
 
 _KEYS = {
-    "point": ({"position", "side"}, set()),
-    "line": ({"point", "direction", "side"}, set()),
+    "point": ({"position", "side"}, {"member_radius"}),
+    "line": ({"point", "direction", "side"}, {"member_radius"}),
     "plane": ({"point", "normal"}, {"side", "member_radius", "node"}),
     "circle": ({"center", "radius"}, {"side", "member_radius", "node"}),
     "cylinder": ({"center", "radius"}, {"side", "axis", "member_radius", "node"}),

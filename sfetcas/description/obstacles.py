@@ -1,7 +1,8 @@
 """The geometry of obstacles: gaps and normals, of arrays of points, in SI units and fixed axes.
 
 Three kinds: *flat* (a plane), *round* (a circle, cylinder or sphere), and *sharp* (a point in the plane or a line in
-space: a member slides over it, and the normal is that of the member).
+space: a member slides over it, and the normal is that of the member).  For members of some
+radius it is round.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ __all__ = [
     "Obstacle",
     "carriers",
     "check_start",
+    "edge_side",
     "edge_slopes",
     "members_of",
     "nearest",
@@ -48,7 +50,7 @@ class Obstacle:
     normal : ndarray (3,)
         Unit normal of a plane; direction of an edge (z for a point in the plane); zero for round obstacles.
     radius : float
-        m.
+        m; zero of an edge that members of some radius touch, which then is round.
     sign : float
         1, or -1 where members are inside.
     side : ndarray (3,)
@@ -118,7 +120,8 @@ def obstacle(contact: Contact, space: bool) -> Obstacle:
         point = contact.position if contact.type == "point" else contact.point
         edge = eye[2] if contact.type == "point" else unit(contact.direction)
         side = np.asarray(contact.side, dtype=float)
-        return Obstacle("sharp", np.asarray(point, dtype=float), eye - np.outer(edge, edge), edge, side=side)
+        kind: Literal["round", "sharp"] = "round" if contact.member_radius > 0.0 else "sharp"
+        return Obstacle(kind, np.asarray(point, dtype=float), eye - np.outer(edge, edge), edge, side=side)
     axis = unit(contact.axis)
     across = eye if contact.type == "sphere" else eye - np.outer(axis, axis)
     sign = -1.0 if contact.side == "inside" else 1.0
@@ -198,6 +201,14 @@ def edge_slopes(edge: Obstacle, positions: Curve, tangents: Curve, x: Array) -> 
     return np.einsum("ni,ni->n", (positions(x) - edge.place) @ edge.across, tangents(x))
 
 
+def edge_side(edge: Obstacle, positions: Curve, tangents: Curve) -> float:
+    """1 or -1: sign of (edge x tangent) on the allowed side, where an undeformed member is nearest to an edge."""
+    x = np.linspace(0.0, 1.0, 257)
+    near = np.argmin(np.linalg.norm((positions(x) - edge.place) @ edge.across, axis=1))
+    normal = np.cross(edge.normal, tangents(x[near : near + 1])[0])
+    return 1.0 if edge.side is None or normal @ edge.side >= 0.0 else -1.0
+
+
 def check_start(obstacle: Obstacle, positions: Curve, tangents: Curve, size: float, radius: float = 0.0) -> None:
     """Refuse a member of given radius, m, that is inside an obstacle in the undeformed scene.
 
@@ -216,8 +227,10 @@ def check_start(obstacle: Obstacle, positions: Curve, tangents: Curve, size: flo
         side = normals @ obstacle.side
         if (np.abs(side) < tolerances.PARALLEL * np.linalg.norm(obstacle.side)).any():
             raise SceneError("passes along the key 'side', accepted: a direction across the member")
-        gaps = np.sign(side) * np.einsum("ni,ni->n", positions(x) - obstacle.place, normals)
+        gaps = np.sign(side) * np.einsum("ni,ni->n", positions(x) - obstacle.place, normals) - radius
     else:
+        if obstacle.side is not None:
+            check_start(replace(obstacle, kind="sharp"), positions, tangents, size, radius)
         gaps = obstacle.gaps(positions(x), tangents(x)) - radius
     deepest = int(np.argmin(gaps))
     if gaps[deepest] < -tolerances.CLOSED * size:

@@ -309,13 +309,12 @@ class Scene(Record):
     def touches_at_points(self) -> bool:
         """Whether it is an unknown where members touch, see :mod:`sfetcas.mechanics.contact_points`.
 
-        In load steps they are, but beside edges, stops and tendons that may be slack; elsewhere where they touch each
-        other, have a radius or laws that touches as conditions of elements lack, or obstacles move.
+        In load steps they are, but beside stops and tendons that may be slack; elsewhere where they touch each other,
+        have a radius or laws that touches as conditions of elements lack, or obstacles move.
         """
         if any(_why_points(self, name) for name in self.contacts):
             return True
-        edges = any(stop.kind == "sharp" for stop in self.obstacles.values())
-        return bool(self.contacts) and self.analysis.type == "static" and not (edges or self.stopped)
+        return bool(self.contacts) and self.analysis.type == "static" and not self.stopped
 
     @property
     def rubs(self) -> bool:
@@ -1049,10 +1048,9 @@ def _check_points(scene: Scene) -> None:
         known = {"friction": "'static', where the order of steps is known, or 'dynamic'", CARRIED: STEPPED}
         accepted = known.get(what, "'static'")
         raise SceneError(f"{message}, accepted: with {accepted}", where)
-    edges = [other for other, stop in scene.obstacles.items() if stop.kind == "sharp"]
-    if edges:
-        message = f"{found} beside the edge {edges[0]!r}, accepted: planes, circles, cylinders and spheres"
-        raise SceneError(message, where)
+    for edge, stop in scene.obstacles.items():
+        if stop.kind == "sharp" and scene.contacts[edge].friction > 0.0:
+            raise SceneError("found friction on an edge, accepted: with 'member_radius', or none", ("contacts", edge))
     if scene.stopped:
         raise SceneError(f"{found} beside stops or tendons that may be slack, accepted: one of these", where)
 

@@ -323,6 +323,11 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
             yield from guided(parts, Meeting, (point.name,) * 2, (member, point.at[side]), slides[side], side == 1)
         gap, ways = _gap(parts.scene, point, space)
         data = np.append(begin[:axes], point.distance) / unit
+        if point.met:
+            # Where the edge is, both ways across it.
+            other = np.cross(parts.scene.obstacles[point.contact].normal, ways[0])[:axes]
+            place, row = (between,), f"{point.name}, beside"
+            yield One(gap, point.name, "", np.concatenate([other, data]), (), place, row)
         data = np.concatenate([*(way[:axes] for way in ways), data])
         yield _held(parts, point, gap, data, begin, slides)
 

@@ -205,6 +205,9 @@ class Fields:
             force = np.array([found[f"force {axis}"] for axis in "xyz"])
             friction = np.array([found.get(f"friction {axis}", 0.0) for axis in "xyz"])
         answer: dict[str, Any] = {"at": at, "force": force, "push": found["push"]}
+        if point.met:
+            here = self.slopes(point.members[0], np.clip(at, 0.0, 1.0))
+            answer["push"] = float(force @ self.obstacle(point.contact).normals(here, here, point.edge)[0])
         if point.grip is not None:
             # Along a line the friction that the law is for is that along the directions of each place.
             size = float(np.linalg.norm([found[f"friction {axis}"] for axis in "xyz"]))

@@ -162,6 +162,8 @@ class ContactPoint:
         see :mod:`~sfetcas.mechanics.contact_lines`.
     sides : (bool, bool)
         Whether it does so on the element before it, and on the one beyond.
+    edge : float
+        On an edge 1 or -1, the sign of (edge x tangent) on the side where its member is; else zero.
     """
 
     contact: str
@@ -175,6 +177,7 @@ class ContactPoint:
     grip: Grip | None = None
     line: bool = False
     sides: tuple[bool, bool] = (True, True)
+    edge: float = 0.0
 
     @property
     def name(self) -> str:
@@ -202,11 +205,17 @@ class ContactPoint:
         On a line these are means instead of the vector: of the gap alone without friction.
         """
         gap, count = [] if self.grip else [f"{self.name}, gap"], self.components(axes)
+        gap = [f"{self.name}, beside", *gap] if self.met else gap
         return [*([f"{self.name}, {i + 1} of {count}" for i in range(count)] if count > 1 else [self.name]), *gap]
 
     def components(self, axes: int) -> int:
         """Number of components of the vector between centre lines, or of the means along a line."""
         return 1 if self.line and self.grip is None else axes
+
+    @property
+    def met(self) -> bool:
+        """Whether its place is where the edge is, which takes two rows: of what is new the distance is one."""
+        return bool(self.edge) and not self.new
 
     @property
     def pressed(self) -> str:

@@ -71,7 +71,7 @@ def sketch_obstacle(sketch: Sketch, name: str, stop: Obstacle) -> None:
     label, plane = f"contact-{name}", sketch.view.angles is None
     if stop.kind == "flat":
         (_sketch_wall if plane else _sketch_pane)(sketch, label, stop)
-    elif stop.kind == "sharp":
+    elif stop.side is not None:
         (_sketch_wedge if plane else _sketch_edge)(sketch, label, stop)
     elif plane:
         _sketch_round(sketch, label, stop)
