@@ -365,9 +365,9 @@ class Closest:
 
     def lies(self, fields: Fields, pair: PairKey, begin: float, end: float) -> bool:
         """Whether a member lies on an obstacle between two fractions of its length."""
-        x = np.linspace(begin, end, SAMPLES + 2)[1:-1]
-        if self.pairs[pair].edge:
+        if self.pairs[pair].stop is None or self.pairs[pair].edge:
             return False
+        x = np.linspace(begin, end, SAMPLES + 2)[1:-1]
         return bool(np.abs(self._gaps(fields, self.pairs[pair], x)[0]).max() < self.lying)
 
     def lies_up_to(self, fields: Fields, pair: PairKey, begin: float, end: float) -> bool:
