@@ -56,7 +56,7 @@ def sagging(steps):
     ids=["light", "strong", "stretching"],
 )
 def test_edge_that_pushes_is_a_ring_that_the_ground_holds(value, section):
-    """The equations are the same, and so are stable directions: nothing is largest in the place on an edge."""
+    """The equations are the same, and so are eigenvalues: nothing is largest in the place on an edge."""
     table = over(edge(0.5, 0.0), value=value)
     table["sections"]["s"] |= section
     ringed = {key: entry for key, entry in table.items() if key != "contacts"}
@@ -64,10 +64,10 @@ def test_edge_that_pushes_is_a_ring_that_the_ground_holds(value, section):
     ringed |= {"rings": {"eye": {"node": "R", "member": "m"}}}
     one, ring = solve(made(table)).last, solve(made(ringed)).last
     found = one.contacts["edge"]
-    # Rounding.
-    np.testing.assert_allclose(one.position("B"), ring.position("B"), atol=1e-11)
-    np.testing.assert_allclose(found["force"], ring.reaction("R")[0], atol=1e-10 * np.linalg.norm(found["force"]))
-    assert one.certificate.smallest == pytest.approx(ring.certificate.smallest, rel=1e-8)
+    # Two meshes of accuracy 1e-9, of a size of 2 m; forces and eigenvalues have derivatives of the positions.
+    np.testing.assert_allclose(one.position("B"), ring.position("B"), atol=4e-9)
+    np.testing.assert_allclose(found["force"], ring.reaction("R")[0], atol=1e-7 * np.linalg.norm(found["force"]))
+    assert one.certificate.smallest == pytest.approx(ring.certificate.smallest, rel=1e-6)
 
 
 @pytest.mark.parametrize("space", [False, True])

@@ -16,8 +16,8 @@ Elsewhere on an obstacle ``d`` begins at its place, a point of a plane, a centre
     n . d - radius_1      or      |d - (a . d) a| - (radius_1 + radius),      inside of it with the opposite sign.
 
 On an edge of the direction ``a`` both components of ``d`` across it vanish, ``n . d = 0`` and ``(a x n) . d = 0`` with
-any fixed ``n`` across it.  These rows say where the place is; the Lagrangian is not largest in it, and the force, in the
-plane of both, is normal to the member.  As long as it is new, only the first of them holds, at a place that stays.
+any fixed ``n`` across it.  These rows say where the place is; the Lagrangian is not largest in it, and the force is
+normal to the member and the edge.  As long as a point is new only the first of them holds, at a place that stays.
 
 An obstacle that a node carries, at ``u_c`` and turned by ``R``, begins at the place to which that has brought it; its
 gap is that of ``R^T d``, the vector as the obstacle sees it, and so is all that friction is about.
