@@ -166,14 +166,19 @@ def test_member_slides_over_a_node_as_over_any_other_place():
         np.testing.assert_allclose(a["force"], b["force"], atol=3e-6)
 
 
-def test_corner_of_a_chain_hangs_on_an_edge_and_holds_what_the_load_is_more():
-    """A rod hangs from an arch: the hinge between them is pressed onto the edge from both sides."""
+def hanging(x, steps):
+    """A rod that hangs from an arch, and an edge below the hinge between them."""
     nodes = {"A": {"position": [0, 0], "support": "hinge"}, "C": {"position": [0.9589, 0.0], "joint": "hinge"}}
     nodes["B"] = {"position": [1.75, -0.1]}
     arch = {"nodes": ["A", "C"], "section": "s", "shape": {"type": "arc", "angle": -1.0}}
-    table = over(edge(0.97, -0.1), value=(0, -10), nodes=nodes, analysis={"accuracy": 1e-6, "steps": [0.1, 0.3, 1.0]})
+    table = over(edge(x, -0.1), value=(0, -10), nodes=nodes, analysis={"accuracy": 1e-6, "steps": steps})
     table["members"] = {"m": arch, "k": {"nodes": ["C", "B"], "type": "rigid"}}
-    light, more, heavy = solve(made(table)).steps
+    return solve(made(table)).steps
+
+
+def test_corner_of_a_chain_hangs_on_an_edge_and_holds_what_the_load_is_more():
+    """The hinge between arch and rod is pressed onto the edge from both sides."""
+    light, more, heavy = hanging(0.97, [0.1, 0.3, 1.0])
     for step in (light, more):
         np.testing.assert_allclose(step.position("C")[:2], [0.97, -0.1], atol=1e-12)
         assert step.certificate.stable is True
@@ -182,6 +187,14 @@ def test_corner_of_a_chain_hangs_on_an_edge_and_holds_what_the_load_is_more():
     # Beyond that the arch gives way.
     assert heavy.contacts["edge"]["member"] == "m"
     assert 0.9 < heavy.contacts["edge"]["at"] < 1.0
+
+
+def test_two_members_that_come_to_a_corner_are_one_place():
+    (step,) = hanging(0.96, [0.1])
+    assert step.contacts["edge"]["at"] in (0.0, 1.0)
+    # Rod and arch each push the hinge: moments about the end of the arch, and the rod hangs straight down.
+    np.testing.assert_allclose(step.position("C")[:2], [0.96, -0.1], atol=1e-12)
+    np.testing.assert_allclose(step.reaction("A")[0] + step.contacts["edge"]["force"], [0, 1, 0], atol=1e-9)
 
 
 def test_what_slides_off_hangs_free_and_what_begins_anew_does_not():
