@@ -233,7 +233,6 @@ def pushes(step):
         return np.array([step.fields.contact_point(point)["push"] for point in step.model.mesh.points])
     touched = Touched.of(step.fields)
     found = [touched.push(t) for t in step.model.mesh.touches if t.to is None]
-    found += [step.fields.contact_point(point)["push"] for point in step.model.mesh.points]
     for touch in step.model.mesh.touches:
         if touch.to is not None:
             found += end_pushes(touched, touch)

@@ -473,9 +473,9 @@ class MemberContact:
             more = tuple(point for point in more if point.pair not in begins)
             return (*slid, *more), int(wrong.sum()) + len(more) + len(begins)
         kept = self._merged(now, pushes)
-        freed = self.edges.joined(tuple(self._freed(fields, point) for point in kept))
+        slid = self.edges.joined(tuple(self._freed(fields, point) for point in kept))
         moved = self.gripping.off_centre(fields, points, now)
-        return freed, int(moved or freed != tuple(now))
+        return slid, int(moved or slid != tuple(now))
 
     def _wrong(self, found: Solved, now: list[ContactPoint], pushes: Array) -> Array:
         """Whether points, where they are now, are where nothing is nearest, or would have to pull."""
