@@ -24,7 +24,7 @@ from ..mechanics.segments import SAME_CUT, standing
 from ..solvers.prepared import Solved
 from .closest import Closest, Near, Pair, PairKey
 
-__all__ = ["Lines", "Points", "begun", "points_of"]
+__all__ = ["FEWEST", "LINE", "SHORT_LINE", "Lines", "Points", "begun", "points_of"]
 
 Points = tuple[ContactPoint, ...]
 
@@ -59,7 +59,7 @@ SHARES = 0.2, 3.0
 """Of how far an end is moved what is missing falls by, between which that is taken for the rest as well."""
 
 SLENDEREST, FELT = 0.05, 1e-5
-"""Length of an element beside the end of a line at least, over that of both beside it, and rotation, over the accuracy,
+"""Length of an element beside the end of a line at least, over the shorter one before, and rotation, over the accuracy,
 that the end of a line makes by being elsewhere, below which it stays.
 """
 
@@ -392,7 +392,7 @@ class Lines:
         if moved and SHARES[0] < (former - missing) / moved < SHARES[1]:
             apart *= moved / (former - missing)
         # Elements do not become too short: what is in less than one is a point.
-        least = SLENDEREST * (beyond - before)
+        least = SLENDEREST * min(beyond, -before)
         low, high = max(ROOM * before, min(before + least, 0.0)), min(ROOM * beyond, max(beyond - least, 0.0))
         apart = min(max(apart, low), high)
         known[member, cut] = missing, apart
