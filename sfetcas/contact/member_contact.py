@@ -73,6 +73,11 @@ NEAREST = 1e-3
 LIES = 1e-9
 """Half the slope of the distance at the end of a member from which on places beside it are nearer, rad."""
 
+SMOOTH = 1e-6
+"""Slope of the distance, rad, up to which a member is tangential to an obstacle at its end, and how far a place slides
+there at most, a fraction of the length.
+"""
+
 LASTING = 1e-9
 """Share of the largest contact force up to which a force of the wrong sign is rounding."""
 
@@ -468,8 +473,8 @@ class MemberContact:
         if wrong.any() or more:
             kept = [point for point, off in zip(now, wrong, strict=True) if not off]
             slid = tuple(self._freed(fields, point) for point in kept)
-            # What begins to slide may do away with what penetrates beside it.
-            begins = {point.pair for point, old in zip(slid, kept, strict=True) if point.slides != old.slides}
+            # What begins to slide on an obstacle may do away with what penetrates beside it.
+            begins = {p.pair for p, old in zip(slid, kept, strict=True) if p.slides != old.slides and len(p.at) == 1}
             more = tuple(point for point in more if point.pair not in begins)
             return (*slid, *more), int(wrong.sum()) + len(more) + len(begins)
         kept = self._merged(now, pushes)
@@ -581,9 +586,37 @@ class MemberContact:
             most = min(most, float(np.einsum("ni,ni->n", before.tangents(member, x), after.tangents(member, x)).min()))
         return float(np.arccos(np.clip(most, -1.0, 1.0)))
 
-    def unstable(self, found: Solved) -> bool:
+    def unstable(self, found: Solved, way: Way) -> bool:
         """Whether a state is unstable, and the scene asks to leave such states."""
-        return self.leaves and found.model.minimisable and found.negative > 0
+        return self.leaves and found.model.minimisable and found.negative > 0 and self.rolling(found, way).negative > 0
+
+    def rolling(self, found: Solved, way: Way) -> Solved:
+        """The state in which places at nodes over which members go on smoothly slide, as where they roll they do.
+
+        Of these the stability is that of the state, while what is at an end of a member stays there.
+        """
+        points = points_of(found)
+        slid = tuple(replace(p, slides=(True,)) if self._rolls(found.fields, p) else p for p in points)
+        if slid == points:
+            return found
+        numbered = self.lines.set_out(found.model.mesh, slid)
+        there = self._corrected(replace(found.model.mesh, points=tuple(numbered)), found, way, None, 0.0)
+        if there is None:
+            return found
+        moved = (abs(p.at[0] - now.at[0]) for p, now in zip(points, points_of(there), strict=True))
+        return there if max(moved) < SMOOTH else found
+
+    def _rolls(self, fields: Fields, point: ContactPoint) -> bool:
+        """Whether a point is at a node and on an obstacle to which two members are tangential there."""
+        if len(point.at) > 1 or point.edge or any(point.slides) or point.at[0] not in (0.0, 1.0):
+            return False
+        members, tangential = self.scene.members, 0
+        node = members[point.members[0]].nodes[int(point.at[0])]
+        for key, pair in self.closest.pairs.items():
+            if key[0] == point.contact and pair.stop is not None and not self.closest.stiff(pair.members[0]):
+                ends = [float(end) for end, name in enumerate(members[pair.members[0]].nodes) if name == node]
+                tangential += sum(abs(float(self.closest.slopes(fields, key, (x,))[0])) < SMOOTH for x in ends)
+        return tangential == 2
 
     def follow(self, way: Callable[[float], Way], start: Solved) -> Solved | None:
         """The state at the end of a way, ``way(1)``, from its begin; None if it is lost."""
@@ -603,7 +636,7 @@ class MemberContact:
             there = None if there is None else self._refined(there, way(part))
             mesh = mesh if there is None else replace(there.model.mesh, points=())
             turned = 0.0 if there is None else self.turned(now.solved.fields, there.fields)
-            falling = there is not None and self.unstable(there)
+            falling = there is not None and self.unstable(there, way(part))
             if there is None or (falling and step > NARROW):
                 # What was taken for a line on the way to a state that is not taken is none.
                 step, self.lines.keys = 0.5 * (part - now.part), lines

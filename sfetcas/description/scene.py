@@ -309,8 +309,7 @@ class Scene(Record):
     def touches_at_points(self) -> bool:
         """Whether it is an unknown where members touch, see :mod:`sfetcas.mechanics.contact_points`.
 
-        In load steps they are, but beside stops and tendons that may be slack; elsewhere where they touch each other,
-        have a radius or laws that touches as conditions of elements lack, or obstacles move.
+        In load steps they are, but beside stops; elsewhere where touches as conditions of elements lack what there is.
         """
         if any(_why_points(self, name) for name in self.contacts):
             return True

@@ -10,11 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..contact.contact_statics import refuse_held_inside
 from ..contact.lines import Points, points_of
 from ..contact.member_contact import MemberContact
 from ..description.inserting import stops_between
+from ..description.scene import Scene
+from ..description.supports import along
 from ..errors import LIMITS, SolveError, Status
+from ..mathematics.arrays import unit
 from ..mechanics.accuracy import roughness
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
@@ -80,6 +84,7 @@ class MemberContactSteps:
         if not self.checked:
             self.run.redundant = redundant(pilot.equations, zero.point)
             self.run.refuse_penetrating(zero.fields)
+            refuse_unheld(self.scene, pilot)
             self.checked = True
         if self.last is None:
             alone = self._alone(pilot, factor, zero)
@@ -185,13 +190,13 @@ class MemberContactSteps:
                 break
             smooth *= 0.1
         refuse_large(now.fields)
-        if self.run.unstable(now) and LEFT not in notes:
-            rest = self.run.fallen(replace(now.model.mesh, points=()), now, lambda model: model.loading(factor))
+        if run.unstable(now, lambda model: model.loading(factor)) and LEFT not in notes:
+            rest = run.fallen(replace(now.model.mesh, points=()), now, lambda model: model.loading(factor))
             if rest is not None:
                 return self._refined(rest, factor, (*notes, LEFT))
         if factor in self.moved and LEFT not in notes:
             notes = (*notes, LEFT)
-        stability = now.stability
+        stability = run.rolling(now, lambda model: model.loading(factor)).stability
         more: dict[str, Any] = {"error_estimate": error, "error_of": self.meshes.error_of}
         answer = finished(now, stability, notes=notes, way=("in contact",), **more)
         refuse_lost_forces(answer)
@@ -239,6 +244,27 @@ class MemberContactSteps:
             detail = "what touches on a coarse mesh was not found on a finer one"
             raise SolveError(Status.FAILED, detail, found.state)
         return there
+
+
+def refuse_unheld(scene: Scene, pilot: Prepared) -> None:
+    """Refuse a scene that neither supports nor planes without friction hold in some direction.
+
+    Raises
+    ------
+    SolveError
+        There is one; the message names the direction.
+    """
+    stops, axes = scene.obstacles, pilot.model.element.axes
+    free = np.array(pilot.diagnosis.drifts).reshape(-1, axes)
+    if not len(free) or scene.rubs or not stops or any(stop.kind != "flat" for stop in stops.values()):
+        return
+    nowhere = np.zeros((1, 3))
+    normals = np.array([stop.normals(nowhere, nowhere)[0][:axes] for stop in stops.values()])
+    _, sizes, ways = np.linalg.svd(free @ normals.T @ normals @ free.T)
+    for way in ways[sizes < tolerances.PARALLEL**2]:
+        names = ", ".join(f"contacts.{name}" for name in scene.contacts)
+        detail = f"nothing holds it along {along(unit(way @ free))}, not the frictionless {names}"
+        raise SolveError(Status.FAILED, detail)
 
 
 def undeformed(pilot: Prepared) -> Solved:
