@@ -77,7 +77,7 @@ NARROW = 1e-3
 BEHIND_EDGE = 0.2
 """Distance behind an edge from which a member is not in contact with it, share of the size of the scene."""
 
-LYING, SAMPLES = (1e-10, 1e-6), 7
+LYING, SAMPLES = (1e-8, 1e-6), 7
 """Shares of the size of the scene between which that is up to which a gap between touches is none, and number of places
 where it is seen.
 """

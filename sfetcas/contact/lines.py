@@ -179,7 +179,8 @@ class Lines:
             places = [point.at[0] for point in own]
             # What touches at a node touches with all members there.
             places += [x for x in self._shared(pair, points) if x not in places]
-            if len(places) < least if key not in self.keys else not any(point.slides[0] for point in own):
+            needed = least if pair.stop is not None else LINE
+            if len(places) < needed if key not in self.keys else not any(point.slides[0] for point in own):
                 continue
             self.keys |= {key}
             longest = self._longest(pair, places)
