@@ -719,8 +719,9 @@ def _stretches(
                     entry["sticking"] = before["sticking"] and entry["sticking"]
                 found.pop()
         found.append({**entry, "at": [begin, end] if end > begin else begin})
-    for end in (0, 1):
-        # Of each member the first one, or the last.
+    rough = fields.model.scene.contacts[points[0].contact].friction > 0.0
+    for end in () if rough else (0, 1):
+        # Of each member the first one, or the last; with friction the place of a force matters.
         for entry in {entry["member"]: entry for entry in (found if end else found[::-1])}.values():
             _up_to_end(fields, closest, points[0].contact, entry, end)
     return found
