@@ -58,10 +58,8 @@ SLIVER = 0.25
 SHARES = 0.2, 3.0
 """Of how far an end is moved what is missing falls by, between which that is taken for the rest as well."""
 
-SLENDEREST, FELT = 0.05, 1e-5
-"""Length of an element beside the end of a line at least, over the shorter one before, and rotation, over the accuracy,
-that the end of a line makes by being elsewhere, below which it stays.
-"""
+SLENDEREST = 0.05
+"""Length of an element beside the end of a line at least, over the shorter one before."""
 
 FEWEST = 2
 """Ends of elements on a line up to which it may be a point."""
@@ -335,10 +333,11 @@ class Lines:
         return marks
 
     def with_moved_ends(
-        self, found: Solved, accuracy: float, before: dict[tuple[str, int], tuple[float, float]]
+        self, found: Solved, least: tuple[float, float], before: dict[tuple[str, int], tuple[float, float]]
     ) -> tuple[Mesh, Points] | None:
         """Mesh and points where elements end where lines on obstacles do; None where they do well enough.
 
+        ``least`` are how far, over the unit of length, and by which rotation, rad, that moves anything at least;
         ``before`` has what was missing at each end of elements the last time, and how far it was moved; of this one
         then.
         """
@@ -349,7 +348,7 @@ class Lines:
             for stretch in stretches if follows else ():
                 for at, way in ((stretch[0], -1), (stretch[-1], 1)):
                     if 0.0 < at < 1.0 and np.abs(breaks - at).min() > SAME_CUT and (member, at) not in moved:
-                        there = self._end(found, key, at, way if len(stretch) > 1 else 0, accuracy, before)
+                        there = self._end(found, key, at, way if len(stretch) > 1 else 0, least, before)
                         moved |= {} if there == at else {(member, at): there}
         if not moved:
             return None
@@ -366,7 +365,7 @@ class Lines:
         key: PairKey,
         at: float,
         way: int,
-        accuracy: float,
+        moving: tuple[float, float],
         known: dict[tuple[str, int], tuple[float, float]],
     ) -> float:
         """Where a line ends that has its last end of elements at a place, on the side ``way`` of it, 1 or -1.
@@ -397,7 +396,7 @@ class Lines:
         low, high = max(ROOM * before, min(before + least, 0.0)), min(ROOM * beyond, max(beyond - least, 0.0))
         apart = min(max(apart, low), high)
         known[member, cut] = missing, apart
-        far = abs(apart) * length > accuracy and abs(bends * unit * apart) * length > FELT * accuracy
+        far = abs(apart) * length > moving[0] and abs(bends * unit * apart) * length > moving[1]
         return at + apart if far else at
 
 

@@ -84,6 +84,10 @@ LASTING = 1e-9
 ALLOWED = 1e-3
 """Largest penetration over the sum of the radii, whatever accuracy is asked for."""
 
+ENDS = 8
+"""Times that ends of lines are located on one mesh: each time their error falls by a share of itself, or to its square.
+"""
+
 ROUGH, REFINED = 0.05, 8
 """Roughness, see :func:`~sfetcas.mechanics.accuracy.roughness`, from which elements are divided on the way, as what is
 unstable on a coarse mesh may be stable; divisions at one state at most.
@@ -705,6 +709,24 @@ class MemberContact:
             if finer is None or self.turned(found.fields, finer.fields) > STRIDE:
                 return None
             found = finer
+        return found
+
+    def with_ends(self, found: Solved, way: Way, least: tuple[float, float]) -> Solved | None:
+        """The state with elements that end where lines on obstacles do; None where it is not found.
+
+        ``least`` as of :meth:`.Lines.with_moved_ends`.
+        """
+        before: dict[tuple[str, int], tuple[float, float]] = {}
+        for _ in range(ENDS):
+            # What touches at single places slides there.
+            found = self.as_points(found, way, 1) or found
+            moved = self.lines.with_moved_ends(found, least, before)
+            if moved is None:
+                break
+            there = self.resolved(*moved, found, way)
+            if there is None or self.turned(found.fields, there.fields) > STRIDE:
+                return None
+            found = there
         return found
 
     def as_points(self, found: Solved, way: Way, most: int = FEWEST) -> Solved | None:

@@ -47,9 +47,8 @@ SHARES = (1.0, 1e-2, 1e-4)
 yet touch.
 """
 
-ENDS = 8
-"""Times that ends of lines are located on one mesh: each time their error falls by a share of itself, or to its square.
-"""
+FELT = 1e-5
+"""Rotation, over the accuracy, that the end of a line makes by being elsewhere, below which it stays."""
 
 LEFT = "left an equilibrium that is unstable on the fine mesh only"
 """A note."""
@@ -212,18 +211,11 @@ class MemberContactSteps:
         return now if there is None or run.turned(now.fields, there.fields) > NEAR else there
 
     def _with_ends(self, now: Solved, factor: float) -> Solved:
-        """The state with elements that end where lines on obstacles do."""
-        before: dict[tuple[str, int], tuple[float, float]] = {}
-        for _ in range(ENDS):
-            # What touches at single places slides there.
-            now = self.run.as_points(now, lambda model: model.loading(factor), 1) or now
-            moved = (
-                None if self.meshes.prescribed else self.run.lines.with_moved_ends(now, self.meshes.accuracy, before)
-            )
-            if moved is None:
-                break
-            now = self._onto(moved[0], now, factor, moved[1])
-        return now
+        """The state with elements that end where lines on obstacles do; as it is in a prescribed mesh, or not found."""
+        if self.meshes.prescribed:
+            return now
+        least = self.meshes.accuracy, FELT * self.meshes.accuracy
+        return self.run.with_ends(now, lambda model: model.loading(factor), least) or now
 
     def _onto(self, mesh: Mesh, found: Solved, factor: float, points: Points | None = None) -> Solved:
         """The same state on another mesh, with known points or those of the state.
