@@ -64,6 +64,9 @@ FIRST, SHORTEST, AIM = 0.25, 2.0**-14, 0.7
 TOUCHED = 4e-5
 """How far places may have moved along each other in a step before they touch, of the size, over the first step."""
 
+SUDDEN = 3.0
+"""How many times faster than in the step before what is followed may turn, where it turns by a little at all."""
+
 NARROW = 2.0**-8
 """Step below which a loss of stability is taken for located, part of the way."""
 
@@ -625,7 +628,7 @@ class MemberContact:
     def follow(self, way: Callable[[float], Way], start: Solved) -> Solved | None:
         """The state at the end of a way, ``way(1)``, from its begin; None if it is lost."""
         self.jumps, self.falls, mesh = [], 0, replace(start.model.mesh, points=())
-        now, step, left = _Step(0.0, start), self.first, -1.0
+        now, step, left, pace = _Step(0.0, start), self.first, -1.0, 0.0
         while now.part < 1.0:
             self.reached = now
             part, lines = min(1.0, now.part + step), self.lines.keys
@@ -641,7 +644,9 @@ class MemberContact:
             mesh = mesh if there is None else replace(there.model.mesh, points=())
             turned = 0.0 if there is None else self.turned(now.solved.fields, there.fields)
             falling = there is not None and self.unstable(there, way(part))
-            if there is None or (falling and step > NARROW):
+            # What turns so much faster than before may have gone over to another branch.
+            sudden = turned > max(SLOW, SUDDEN * pace * (part - now.part)) and pace > 0.0
+            if there is None or ((falling or sudden) and step > NARROW):
                 # What was taken for a line on the way to a state that is not taken is none.
                 step, self.lines.keys = 0.5 * (part - now.part), lines
                 if there is None and step < NARROW and left < now.part:
@@ -661,6 +666,7 @@ class MemberContact:
                 there = rest
             # As long as turns by a little less than a stride.
             longer = min(2.0, AIM * self.stride / max(turned, 0.1 * self.stride))
+            pace = turned / (part - now.part) if not falling else 0.0
             now, step = _Step(part, there), longer * (part - now.part) if not falling else self.first
         return now.solved
 
