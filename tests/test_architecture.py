@@ -242,6 +242,8 @@ ORDER = [
     "paths.contact_curve",
     "paths.contact_trace",
     "paths.contact_path",
+    "paths.conditions",
+    "paths.touching",
     "paths.switching",
     "paths.memory_path",
     "paths.paths",

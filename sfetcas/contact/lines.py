@@ -24,7 +24,7 @@ from ..mechanics.segments import SAME_CUT, standing
 from ..solvers.prepared import Solved
 from .closest import Closest, Near, Pair, PairKey
 
-__all__ = ["FEWEST", "LINE", "SHORT_LINE", "Lines", "Points", "begun", "points_of"]
+__all__ = ["FEWEST", "LINE", "SHORT_LINE", "Lines", "Points", "begun", "points_in", "points_of"]
 
 Points = tuple[ContactPoint, ...]
 
@@ -402,10 +402,14 @@ class Lines:
 
 def points_of(found: Solved) -> Points:
     """The points of a state, where they are now."""
-    fields = found.fields
+    return points_in(found.fields)
+
+
+def points_in(fields: Fields) -> Points:
+    """As :func:`points_of`."""
     return tuple(
         replace(point, at=fields.contact_point(point)["at"]) if any(point.slides) else point
-        for point in found.model.mesh.points
+        for point in fields.model.mesh.points
     )
 
 

@@ -234,7 +234,7 @@ class MemberContact:
             points += self.lines.laid([near]) if self.lines.has(near) else [begun(near)]
         prepared = self.prepare(replace(mesh, points=tuple(self.lines.set_out(mesh, points))))
         nothing = prepared.model.loading(0.0, 0.0)
-        state = self._carried(start, prepared)
+        state = self.carried(start, prepared)
         return Solved(prepared, state, nothing, prepared.equations.at(state, nothing), 0.0)
 
     def _ends(self, near: Near | ContactPoint) -> list[tuple[str, str]]:
@@ -278,7 +278,7 @@ class MemberContact:
         pushing = np.array([rows[every[i].rows(prepared.model.element.axes)[-1]] for i in free])
         acting = np.array([i < len(points) for i in free])
         resisting = None if since is None else self._drag(prepared, since, drag)
-        loads, state = way(prepared.model), self._carried(source, prepared)
+        loads, state = way(prepared.model), self.carried(source, prepared)
         system = OneSided(prepared.equations, loads, prepared.weight, None, None, resisting, pushing, acting)
         with np.errstate(over="ignore", invalid="ignore"):
             found = correct(system, state, limits=Limits(iterations=ITERATIONS, most=TURN, contraction=2.0))
@@ -319,7 +319,7 @@ class MemberContact:
         """The equilibrium on a mesh with its points, as of :meth:`solved`."""
         prepared = self.prepare(mesh)
         loading = way(prepared.model)
-        state = self._carried(source, prepared)
+        state = self.carried(source, prepared)
         # Seen without contact, whose rows depend on others only nearly, where places are beside each other.
         prepared.equations.redundant = self.redundant
         resisting = None
@@ -345,7 +345,7 @@ class MemberContact:
                 moved.append(number[label])
         return Drag(prepared.equations, replace(there, y=y), size, np.array(moved, np.intp))
 
-    def _carried(self, source: Solved, prepared: Prepared) -> State:
+    def carried(self, source: Solved, prepared: Prepared) -> State:
         """A state as the start on another mesh or with other points, which begin where they are now."""
         target, before = prepared.model, source.model
         state = transferred(before, source.state, target)

@@ -969,7 +969,7 @@ def _check_contacts(scene: Scene) -> None:
         if spring.stop is not None and scene.contacts and scene.analysis.type == "path":
             message = "found a stop with contacts on a path, accepted: with analysis.type = 'static' and steps"
             raise SceneError(message, ("springs", name, "stop"))
-    if scene.contacts and scene.analysis.branches:
+    if scene.contacts and scene.analysis.branches and not scene.touches_at_points:
         message = (
             f"found {scene.analysis.branches} with contacts, accepted: 0, as bifurcations in contact are not located"
         )
@@ -1041,8 +1041,11 @@ def _check_points(scene: Scene) -> None:
     name, what = next(((name, why) for name, why in reasons if why), ("", ""))
     if not what:
         return
+    on_path = scene.analysis.type == "path"
+    if on_path and scene.rubs:
+        name, what = next((name, "friction") for name, contact in scene.contacts.items() if contact.friction > 0.0)
     where, found = ("contacts", name), f"found {what}"
-    if scene.analysis.type != "static":
+    if scene.analysis.type != "static" and (scene.rubs or not on_path):
         message = f"{found} with analysis.type = {scene.analysis.type!r}"
         known = {"friction": "'static', where the order of steps is known, or 'dynamic'", CARRIED: STEPPED}
         accepted = known.get(what, "'static'")

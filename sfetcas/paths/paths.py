@@ -21,7 +21,7 @@ from ..description.remembering import refuse_memory
 from ..description.scene import Scene
 from ..equilibria.settings import Settings, settings_with
 from ..equilibria.solution import Equilibrium, equilibrium
-from ..equilibria.statics import pilot_of
+from ..equilibria.statics import pilot_of, solve
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.threads import single_threaded
 from ..mechanics.accuracy import largest_difference
@@ -30,7 +30,6 @@ from ..mechanics.fields import Fields, transferred
 from ..mechanics.law_limits import first_beyond_laws
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
-from ..mechanics.unilateral import Stops
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.beginning import check_slack
 from ..solvers.critical import Event, shapes_at
@@ -38,9 +37,11 @@ from ..solvers.prepared import Prepared
 from ..solvers.redundancy import with_sharing
 from ..solvers.residuals import relative_residual
 from ..solvers.tracing import full_shape, passes, switched
+from .conditions import Choice, Conditions, Stopping
 from .contact_path import MARGIN, STEADY, follow_in_contact
 from .memory_path import HILL, MISSING, chosen_of, left_along, refined_by_fronts, sampled_again, steps_of
 from .path import NO_POTENTIAL, Branch, Path, PathPoint, TransitionPoint, ending
+from .touching import Touching
 from .switching import Choices, Followed, Transition
 from .vibrations import shaken, with_modes
 
@@ -96,7 +97,7 @@ def follow_path(scene: Scene, settings: Settings | None = None, **changes: Any) 
     """
     if scene.analysis.type != "path":
         raise SceneError(f"found {scene.analysis.type!r}, accepted: 'path' to follow one", ("analysis", "type"))
-    if scene.contacts:
+    if scene.contacts and not scene.touches_at_points:
         return follow_in_contact(scene, settings_with(settings, changes))
     settings = settings_with(settings, changes)
     path = PathTracing(scene, settings).path()
@@ -204,8 +205,9 @@ class _Stretch:
 
     def leads_through(self, curve: Curve, point: Standing) -> bool:
         """Whether it leads through an equilibrium on a curve."""
-        stops = curve.model.mesh.stops
-        return any(passes(curve, p.traced, point) for p in self.traced.parts if p.curve.model.mesh.stops == stops)
+        kind = Choice.of(curve.model.mesh).kind
+        parts = [p for p in self.traced.parts if Choice.of(p.curve.model.mesh).kind == kind]
+        return any(passes(p.curve, p.traced, point) for p in parts)
 
     def of_kind(self, kind: str) -> list[Standing]:
         if kind == "transition":
@@ -247,7 +249,10 @@ class PathTracing:
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.assembly: Any = settings.assembly
         self.model: Model | None = None
-        self.stops: Stops = ()
+        self.first = Choice()
+        self.conditions: Conditions[Any] = Stopping(scene)
+        if scene.contacts:
+            self.conditions = Touching(scene, self._prepared, self.accuracy, self.fixed, self._beside)
         knots = {t for h in scene.histories.values() for t in h.knots if self.span[0] < t < self.span[1]}
         self.knots = tuple(sorted(knots))
         self.points = steps_of(scene.analysis) if scene.remembers else scene.analysis.points
@@ -323,7 +328,7 @@ class PathTracing:
 
     def choices(self, mesh: Mesh, unit: float | None = None) -> Choices:
         """The models of a mesh, with the ``unit`` of a path that is known already."""
-        found = Choices(mesh, self._prepared, self.span, self.knots)
+        found = Choices(mesh, self._prepared, self.span, self.knots, self.conditions)
         found.unit = unit or found.unit
         return found
 
@@ -336,6 +341,11 @@ class PathTracing:
         self.seconds["model"] += time.perf_counter() - begin
         return prepared
 
+    def _beside(self, factor: float) -> Equilibrium:
+        """The equilibrium at a factor by itself."""
+        analysis = self.analysis.model_copy(update={"type": "static", "steps": (factor,)})
+        return solve(self.scene.model_copy(update={"analysis": analysis}), self.settings).last
+
     def _halved(self, mesh: Mesh) -> Mesh:
         everything = self.fixed == set(self.scene.members)
         marks = {n: np.full(len(c) - 1, everything or n not in self.fixed) for n, c in mesh.cuts.items()}
@@ -343,7 +353,7 @@ class PathTracing:
 
     def _level(self, mesh: Mesh) -> _Level:
         choices = self.choices(mesh)
-        curve, start, notes = choices.begin(self.stops)
+        curve, start, notes = choices.begin(self.first)
         main = _Stretch(choices.follow(curve, start, self.points, MISSING * self.accuracy))
         way = max(abs(point.factor - start.factor) for point in main.traced.points)
         if main.traced.end == "bent" and way < LEAST_WAY * self._widest:
@@ -352,7 +362,7 @@ class PathTracing:
         if main.traced.end == "lost" and way < LEAST_WAY * self._widest:
             detail = f"the path cannot be followed beyond factor {main.traced.points[-1].factor:.3g}"
             raise SolveError(Status.FAILED, detail, start.state)
-        self.stops = curve.model.mesh.stops
+        self.first = Choice.of(curve.model.mesh)
         for part in (part for part in main.traced.parts if len(part.traced.points) > 1):
             check_slack(part.curve, part.traced)
         level = _Level(choices, curve, [main], notes)
@@ -442,7 +452,7 @@ class PathTracing:
         """Largest difference of points of a coarse stretch when they are corrected on the fine mesh."""
         largest = 0.0
         for point in chosen_of(coarse.curve, traced, STEADY, SAMPLES):
-            curve = fine.choices.curve(point.model.mesh.stops)
+            curve = fine.choices.curve(Choice.of(point.model.mesh))
             state = transferred(point.model, point.state, curve.model)
             flat = Tangent(np.zeros(curve.equations.total), point.tangent.factor)
             found = curve.at_factor(replace(point, state=state, tangent=flat), point.factor)

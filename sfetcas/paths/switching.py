@@ -1,9 +1,9 @@
-"""Following paths over changes of what is unilateral: strings that go slack or become taut, stops that are reached.
+"""Following paths over changes of what is unilateral: strings that go slack, stops that are reached, what touches.
 
-Which strings are taut and which stops are active is a choice, see :mod:`~sfetcas.mechanics.unilateral`.  While it holds
-the equilibria are a smooth curve, which is followed like any other.  Where a margin vanishes the curve ends.  A state
-there is an equilibrium of each choice that differs in what has no margin; of their curves those lead on along which no
-margin falls.  Where the energy of the choice with the fewest active constraints has a strict minimum there is at most
+Which strings are taut, which stops are active and which places touch is a choice, see :mod:`.conditions`.  While it
+holds the equilibria are a smooth curve, which is followed like any other.  Where a margin vanishes the curve ends.  A
+state there is an equilibrium of each choice that differs in what has no margin; of their curves those lead on along
+which no margin falls.  Where the energy of the choice with the fewest active constraints has a strict minimum there is at most
 one to either side of the factor, as rates and multipliers solve a strictly convex quadratic program.  Elsewhere all
 choices are looked at: there may be none, several, and the factor may turn.
 
@@ -13,29 +13,28 @@ Source: Cottle, Pang and Stone 2009, The Linear Complementarity Problem, theorem
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from ..description.records import enumerated
-from ..equilibria.stops import settled
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
-from ..mechanics.fields import Fields, transferred
-from ..mechanics.margins import margins
+from ..mechanics.fields import Fields
 from ..mechanics.mesh import Mesh
-from ..mechanics.unilateral import Stops, Unilateral, switched_over, unilaterals
 from ..solvers.arclength import PASSING, Curve, Standing, Tangent
 from ..solvers.beginning import begin_path
 from ..solvers.critical import Event, at_factors
 from ..solvers.prepared import Prepared
 from ..solvers.tracing import Traced, trace, without
+from .conditions import Begun, Choice, Conditions, Way
 
 __all__ = ["Choices", "Followed", "Part", "Transition"]
 
-NEAR = 1e-7
-"""Margins that are as small have to be asked how they go on."""
+NOTHING = Choice()
+"""The choice in which nothing acts but strings, which are taut."""
 
 STEP = 1e-5
 """Arc length over which rates of margins are differenced: of second order, so 1e-10; rounding leaves 1e-11."""
@@ -50,15 +49,30 @@ ALIKE = 1e-6
 """Two ways on whose directions differ by less are one: a constraint that does nothing makes no other."""
 
 MOST = 6
-"""Constraints without a margin at one point, at most: all choices of them may have to be looked at."""
+"""Conditions without a margin at one point, at most: all choices of them may have to be looked at."""
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A stretch of a path in one choice, and the curve that it is part of."""
+    """A stretch of a path in one choice.
+
+    Attributes
+    ----------
+    curve : Curve
+        What it is part of.
+    traced : Traced
+    begins : Standing or None
+        Where it begins, if that is a little before the first point that was traced.
+    """
 
     curve: Curve
     traced: Traced
+    begins: Standing | None = None
+
+    @property
+    def points(self) -> list[Standing]:
+        """All of them."""
+        return self.traced.points if self.begins is None else [self.begins, *self.traced.points]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +116,7 @@ class Followed:
     @property
     def points(self) -> list[Standing]:
         """Those of all parts; where one part ends and the next begins there are two."""
-        return [point for part in self.parts for point in part.traced.points]
+        return [point for part in self.parts for point in part.points]
 
     @property
     def events(self) -> list[Event]:
@@ -137,21 +151,12 @@ class Followed:
     @property
     def count(self) -> int:
         """Number of points of the last parts that steps led to."""
-        return len(self.points) - len(self.events) - len(self.parts) + 1
+        beginnings = sum(part.begins is not None for part in self.parts)
+        return len(self.points) - beginnings - len(self.events) - len(self.parts) + 1
 
     def without(self, known: Sequence[Standing]) -> Followed:
         """This without the bifurcations at points that are known already, as those of the path it branches off."""
         return replace(self, parts=[replace(part, traced=without(part.traced, known)) for part in self.parts])
-
-
-@dataclass(frozen=True, eq=False)
-class _Way:
-    """A way on from a point: a choice, its curve, and the point on it, its tangent ahead."""
-
-    which: tuple[Unilateral, ...]
-    stops: Stops
-    curve: Curve
-    standing: Standing
 
 
 class Choices:
@@ -166,95 +171,105 @@ class Choices:
         Range of factors.
     knots : tuple of float
         Factors at which histories have knots.
+    conditions : Conditions
+        What is one-sided.
     """
 
     def __init__(
-        self, mesh: Mesh, prepare: Callable[[Mesh], Prepared], span: tuple[float, float], knots: tuple[float, ...]
+        self,
+        mesh: Mesh,
+        prepare: Callable[[Mesh], Prepared],
+        span: tuple[float, float],
+        knots: tuple[float, ...],
+        conditions: Conditions[Any],
     ) -> None:
-        self.mesh, self.span, self.knots = replace(mesh, stops=()), span, knots
-        self._prepare, self._known = prepare, dict[Stops, Prepared]()
-        self.unit = max(map(abs, span))
-        self.constraints = unilaterals(self.prepared(()).model.scene)
+        self.mesh, self.span, self.knots = replace(mesh, stops=(), points=()), span, knots
+        self._prepare, self._known = prepare, dict[Choice, Prepared]()
+        self.unit, self.conditions = max(map(abs, span)), conditions
 
-    def prepared(self, stops: Stops) -> Prepared:
+    def prepared(self, choice: Choice = NOTHING) -> Prepared:
         """The model of a choice, ready to be solved."""
-        if stops not in self._known:
-            self._known[stops] = self._prepare(replace(self.mesh, stops=stops))
-        return self._known[stops]
+        if choice not in self._known:
+            prepared = self._prepare(replace(self.mesh, stops=choice.stops, points=choice.points))
+            self._known[choice] = self.conditions.made(prepared)
+        return self._known[choice]
 
-    def curve(self, stops: Stops) -> Curve:
+    def curve(self, choice: Choice) -> Curve:
         """The curve of a choice."""
-        return Curve(self.prepared(stops), self.unit)
+        return Curve(self.prepared(choice), self.unit)
 
     # -- begin ----------------------------------------------------------------------------------
 
-    def begin(self, stops: Stops = ()) -> tuple[Curve, Standing, tuple[str, ...]]:
+    def begin(self, first: Choice = NOTHING) -> Begun:
         """The first point, as of :func:`~sfetcas.solvers.beginning.begin_path`, in the choice that holds there.
 
-        The search for it begins with ``stops``.
+        The search for it begins with ``first``.
 
         Raises
         ------
         SolveError
             There is no equilibrium to start from, or none that tells in which choice the path goes on.
         """
-        found: dict[Stops, tuple[Curve, Standing, tuple[str, ...]]] = {}
-        if not self.constraints:
-            found[stops] = begin_path(self.prepared(stops), self.span)
-            self.unit = found[stops][0].unit
-            return found[stops]
-
-        def answer(stops: Stops) -> Mapping[Unilateral, float]:
-            found[stops] = begin_path(self.prepared(stops), self.span)
-            return margins(found[stops][1].fields)
-
-        stops = settled(self.prepared(()).model.scene, answer, stops)
-        curve, start, notes = found[stops]
+        if not self.conditions.any:
+            found = begin_path(self.prepared(first), self.span)
+            self.unit = found[0].unit
+            return found
+        curve, start, notes = self.conditions.begin(self.prepared, self.span, first)
         self.unit = curve.unit
-        near = self._without_margin(start)
+        near = self.conditions.near(start.fields)
         if not near:
             return curve, start, notes
         up = 1.0 if self.span[1] > 0.0 else -1.0
-        ways = self._ways(start, stops, near, up, begins=True)
+        refused = self._refused(start, near)
+        ways = [] if refused else self._ways(start, near, up, begins=True)
         if len(ways) != 1:
-            raise SolveError(Status.FAILED, f"at its beginning {_several(ways, near, self.constraints)}", start.state)
-        return ways[0].curve, ways[0].standing, notes
+            why = refused or self._several(ways, near)
+            raise SolveError(Status.FAILED, f"at its beginning {why}", start.state)
+        return *self._onward(ways[0]), notes
+
+    def _refused(self, at: Standing, near: Sequence[Any]) -> str:
+        """Why the path does not go on from a point beyond which some conditions change; empty where it may."""
+        if len(near) > MOST:
+            return f"{len(near)} {self.conditions.kinds} change at once, accepted: at most {MOST}"
+        return self.conditions.refused(at.fields, near)
+
+    def _onward(self, way: Way) -> tuple[Curve, Standing]:
+        """The curve of a way, and the first point on it that is followed."""
+        # Curves are kept without a piece: they are followed over all of them.
+        return self.conditions.onward(way, self.curve, self.span) or (self.curve(way.choice), way.standing)
 
     # -- along ----------------------------------------------------------------------------------
 
     def follow(self, curve: Curve, start: Standing, count: int, missing: float = np.inf) -> Followed:
         """A path from a point on, over all changes of the choice; ``missing`` as of :func:`.trace`."""
-        found, tried = Followed(), set[Stops]()
-        watch = self._watched if self.constraints else None
+        found, tried, begins = Followed(), set[object](), None
+        watch, passed = (self._watched, self.conditions.passed) if self.conditions.any else (None, None)
         while True:
             left = max(1, count - found.count) if found.parts else count
-            traced = trace(curve, start, self.span, left, self.knots, watch, missing)
-            found.parts.append(Part(curve, traced))
+            traced = trace(curve, start, self.span, left, self.knots, watch, missing, passed)
+            found.parts.append(Part(curve, traced, begins))
             if traced.end != "margin":
                 return found
-            at, stops = traced.points[-1], curve.model.mesh.stops
-            tried = {stops} if len(traced.points) > 1 else {*tried, stops}
-            crossed = [self.constraints[i] for i in traced.crossed]
-            near = list(dict.fromkeys([*crossed, *self._without_margin(at)]))
-            if len(near) > MOST:
-                found.ending = f"{len(near)} tendons and stops change at once, accepted: at most {MOST}"
+            at, choice = traced.points[-1], Choice.of(curve.model.mesh)
+            tried = {choice.kind} if len(traced.points) > 1 else {*tried, choice.kind}
+            near = self.conditions.near(at.fields, traced.crossed)
+            found.ending = self._refused(at, near)
+            if found.ending:
                 return found
-            ways = self._ways(at, stops, near, float(np.sign(at.tangent.factor)))
-            if len(ways) != 1 or ways[0].stops in tried:
-                found.ending = _several(ways, near, self.constraints)
+            ways = self._ways(at, near, float(np.sign(at.tangent.factor)))
+            if len(ways) != 1 or ways[0].choice.kind in tried:
+                found.ending = self._several(ways, near)
                 return found
-            way, way_on = ways[0], ways[0].standing
-            turns = bool(at.tangent.factor * way_on.tangent.factor < 0.0)
-            changes = tuple(one.becomes(stops) for one in way.which)
-            found.transitions.append(Transition(at, changes, turns, _said(at, way_on, turns)))
-            curve, start = way.curve, way_on
+            way = ways[0]
+            turns = bool(at.tangent.factor * way.standing.tangent.factor < 0.0)
+            changes = tuple(self.conditions.becomes(one, choice) for one in way.which)
+            found.transitions.append(Transition(at, changes, turns, _said(at, way.standing, turns)))
+            curve, start = self._onward(way)
+            begins = None if start is way.standing else way.standing
 
     def _watched(self, standing: Standing) -> Array:
-        """Margins (constraints,) of a point."""
-        return np.array(list(margins(standing.fields).values()))
-
-    def _without_margin(self, standing: Standing) -> list[Unilateral]:
-        return [one for one, margin in margins(standing.fields).items() if abs(margin) <= NEAR]
+        """Margins (conditions,) of a point."""
+        return self.conditions.watched(standing.fields)
 
     def crossings(self, followed: Followed, factors: tuple[float, ...]) -> list[Standing]:
         """The points at given factors, in their order along the path; where parts meet they are listed once."""
@@ -262,28 +277,37 @@ class Choices:
         for part in followed.parts:
             first = part.traced.points[0]
             met = at_factors(part.curve, part.traced.points, factors)
-            found += met if part is followed.parts[0] else [point for point in met if point is not first]
+            if part.begins is not None:
+                found += self._beside(part.begins, part.curve, first, factors)
+            keeps = part is followed.parts[0]
+            found += met if keeps else [point for point in met if point is not first]
         # A closed curve ends where it begins.
         last = followed.points[-1]
         return found[:-1] if followed.end == "closed" and last in found else found
 
+    @staticmethod
+    def _beside(begins: Standing, curve: Curve, first: Standing, factors: tuple[float, ...]) -> list[Standing]:
+        """The points at given factors beyond a change, up to the first one that is followed there."""
+        low, high = sorted((begins.factor, first.factor))
+        met = [factor for factor in factors if low < factor < high or factor == first.factor]
+        found = [curve.at_factor(first, factor) for factor in sorted(met, reverse=bool(first.factor < begins.factor))]
+        return [point for point in found if point is not None]
+
     # -- over a change --------------------------------------------------------------------------
 
-    def _ways(
-        self, at: Standing, stops: Stops, near: Sequence[Unilateral], sign: float, *, begins: bool = False
-    ) -> list[_Way]:
-        """The ways on from a point at which some constraints have no margin, with the sign of the factor's rate so far.
+    def _ways(self, at: Standing, near: Sequence[Any], sign: float, *, begins: bool = False) -> list[Way]:
+        """The ways on from a point at which some conditions have no margin, with the sign of the factor's rate so far.
 
         A choice holds along each; those that go the same way are one, in the choice with the fewest changes.
         """
-        fewest = switched_over(stops, [one for one in near if one.active(stops)])
-        unique = self._has_minimum(at, fewest)
-        found: list[_Way] = []
+        choice = Choice.of(at.model.mesh)
+        unique = self._has_minimum(at, [one for one in near if self.conditions.active(one, choice)])
+        found: list[Way] = []
         # What has led to the end of its choice cannot go on in it.
         for size in range(0 if begins else 1, len(near) + 1):
             for which in itertools.combinations(near, size):
                 for ahead in (sign,) if unique or begins else (sign, -sign):
-                    way = self._way(at, switched_over(stops, which), which, ahead)
+                    way = self._way(at, which, ahead)
                     if way is None or min(self._rates(way, near)) < -FLAT:
                         continue
                     if not any(_alike(way, other) for other in found):
@@ -292,23 +316,24 @@ class Choices:
                         return found
         return found
 
-    def _has_minimum(self, at: Standing, stops: Stops) -> bool:
-        """Whether the energy has a strict minimum at a point in a choice."""
-        way = self._way(at, stops, (), 1.0, regular=False)
+    def _has_minimum(self, at: Standing, active: Sequence[Any]) -> bool:
+        """Whether the energy has a strict minimum at a point without some of what is active."""
+        way = self._way(at, active, 1.0, regular=False)
         if way is None or not way.curve.model.conservative:
             return False
         return not way.standing.inertia.negative and not way.standing.inertia.zero
 
-    def _way(
-        self, at: Standing, stops: Stops, which: tuple[Unilateral, ...], sign: float, *, regular: bool = True
-    ) -> _Way | None:
+    def _way(self, at: Standing, which: Sequence[Any], sign: float, *, regular: bool = True) -> Way | None:
         """The way on in a choice with a rising or falling factor; None where what is left is singular in it, or locked.
 
         Motions that are neutral in the choice before are so in any that has fewer active constraints.
         """
-        prepared = self.prepared(stops)
+        choice = self.conditions.switched(at.fields, which)
+        if choice is None:
+            return None
+        prepared = self.prepared(choice)
         curve = Curve(prepared, self.unit, self._piece(at.factor, sign))
-        state = transferred(at.model, at.state, prepared.model)
+        state = self.conditions.carried(at, prepared)
         here = curve.standing(state, at.factor, Tangent(np.zeros(curve.equations.total), sign), arc=at.arc)
         if regular and here.inertia.zero > at.inertia.zero:
             return None
@@ -319,42 +344,40 @@ class Choices:
         gaps = curve.equations.at(state, curve.loading(factor)).residual[curve.equations.unknowns :]
         if regular and np.abs(gaps).max(initial=0.0) > LOCKED * STEP:
             return None
-        # Curves are kept without a piece: they are followed over all of them.
-        return _Way(which, stops, self.curve(stops), replace(here, arc=at.arc))
+        return Way(tuple(which), choice, curve, replace(here, arc=at.arc))
 
     def _piece(self, factor: float, sign: float) -> tuple[float, float]:
         """Factors without a knot of a history, on the side to which the factor goes."""
-        if not self.prepared(()).model.scene.histories:
+        if not self.prepared().model.scene.histories:
             return -np.inf, np.inf
         ends = (self.span[0], *self.knots, self.span[1])
         pieces = [(a, b) for a, b in itertools.pairwise(ends) if a <= factor <= b]
         return pieces[-1 if sign > 0.0 else 0]
 
-    def _rates(self, way: _Way, which: Sequence[Unilateral]) -> list[float]:
+    def _rates(self, way: Way, which: Sequence[Any]) -> list[float]:
         """Rates of margins by the arc length."""
         curve, here = way.curve, way.standing
         ends = []
         for length in (STEP, -STEP):
             state, factor = curve.predicted(here, length)
-            ends.append(margins(Fields(curve.equations, state, curve.loading(factor))))
-        return [(ends[0][one] - ends[1][one]) / (2.0 * STEP) for one in which]
+            ends.append(self.conditions.margin(Fields(curve.equations, state, curve.loading(factor)), which))
+        return ((ends[0] - ends[1]) / (2.0 * STEP)).tolist()
+
+    def _several(self, ways: Sequence[Way], near: Sequence[Any]) -> str:
+        """Why no way is chosen."""
+        names = enumerated(list(dict.fromkeys(map(self.conditions.where, near))))
+        if len(ways) < 2:
+            return f"no choice of {self.conditions.choosing} leads on: {names}"
+        told = ["; ".join(self.conditions.told(one, way.choice) for one in near) for way in ways]
+        return f"{len(ways)} ways lead on, and the path branches: {' or '.join(told)}"
 
 
-def _alike(a: _Way, b: _Way) -> bool:
+def _alike(a: Way, b: Way) -> bool:
     """Whether two ways go the same way, in rotations and the factor."""
     turns, unit = a.curve.equations.rotation_unknowns, a.curve.unit
     one, other = a.standing.tangent, b.standing.tangent
     apart, weight = one.z[:turns] - other.z[:turns], a.curve.weight[:turns]
     return float(apart @ (weight * apart)) + ((one.factor - other.factor) / unit) ** 2 <= ALIKE**2
-
-
-def _several(ways: Sequence[_Way], near: Sequence[Unilateral], constraints: Sequence[Unilateral]) -> str:
-    """Why no way is chosen."""
-    names = enumerated(list(dict.fromkeys(f"{one.table}.{one.name}" for one in near)))
-    if len(ways) < 2:
-        return f"no choice of what is taut and at a stop leads on: {names}"
-    told = ["; ".join(one.is_told(way.stops) for one in near) for way in ways]
-    return f"{len(ways)} ways lead on, and the path branches: {' or '.join(told)}"
 
 
 def _said(before: Standing, after: Standing, turns: bool) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from .sharing import SHARED, SMALLEST, stretches
 from .tracing import Traced
 from .unrestrained import refuse_unrestrained
 
-__all__ = ["begin_path", "check_slack"]
+__all__ = ["begin_path", "begun_at", "beside_zero", "check_slack"]
 
 STARTED = "the path begins at the equilibrium of factor 0 that start places of nodes choose"
 
@@ -44,9 +44,19 @@ def begin_path(prepared: Prepared, span: tuple[float, float]) -> tuple[Curve, St
     SceneError
         Loads drive a free motion without end.
     """
-    up = 1.0 if span[1] > 0.0 else -1.0
-    widest = max(map(abs, span))
-    state, factor, notes = _first_state(prepared, up * BEGINNING * abs(span[1] if up > 0.0 else span[0]))
+    return begun_at(prepared, *_first_state(prepared, beside_zero(span)), span)
+
+
+def beside_zero(span: tuple[float, float]) -> float:
+    """The factor at which a path starts that cannot start at 0."""
+    return BEGINNING * (span[1] if span[1] > 0.0 else span[0])
+
+
+def begun_at(
+    prepared: Prepared, state: State, factor: float, notes: tuple[str, ...], span: tuple[float, float]
+) -> tuple[Curve, Standing, tuple[str, ...]]:
+    """As :func:`begin_path`, at a given equilibrium."""
+    up, widest = 1.0 if span[1] > 0.0 else -1.0, max(map(abs, span))
     curve = Curve(prepared, widest)
     along = Tangent(np.zeros(prepared.equations.total), up)
     tangent = curve.standing(state, factor, along).tangent

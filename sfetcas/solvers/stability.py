@@ -321,7 +321,7 @@ class StabilityTest:
         Returns
         -------
         int
-            Number of eigenvalues below the first listed; -1 if not counted.
+            Number of eigenvalues below the first listed, those of places left out; -1 if not counted.
         ndarray (n,)
             Eigenvalues, rising: in small models all, in large ones the ``NEAREST`` to zero.
         ndarray (rotation unknowns, n)
@@ -336,7 +336,7 @@ class StabilityTest:
         if self._is_dense:
             projected, basis = self._projected(entries, self._rows(point))
             values, vectors = np.linalg.eigh(projected)
-            return 0, values, (basis @ vectors / root)[:turning]
+            return -self._apart, values, (basis @ vectors / root)[:turning]
         values, vectors = self._inverse_iterated(point, entries, sharp=sharp)
         size, before = float(np.abs(values).max()), -1
         if not sharp:

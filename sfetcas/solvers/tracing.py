@@ -131,12 +131,14 @@ def trace(
     knots: tuple[float, ...] = (),
     watch: Callable[[Standing], Array] | None = None,
     missing: float = np.inf,
+    passed: Callable[[Standing, Standing], bool] | None = None,
 ) -> Traced:
     """Follow a curve from a point until the factor leaves the span, or for so many points.
 
     At the knots of histories the curve has a corner: it is followed from one to the next.  ``watch`` gives the margins
-    of a point (n,), dimensionless: where one of them falls below zero the curve ends.  Where members have memory each
-    point is one that the next remembers; a step leaves out ``missing`` of that, over its length, at most.
+    of a point (n,), dimensionless: where one of them falls below zero the curve ends.  ``passed`` says whether something
+    has passed through something else between two neighbours: then the step was too long.  Where members have memory
+    each point is one that the next remembers; a step leaves out ``missing`` of that, over its length, at most.
     """
     usual = start.inertia.zero
     start = curve.without_neutral(start) if usual and start.tangent.neutral is None else start
@@ -158,7 +160,8 @@ def trace(
         stride = (span[1] - span[0]) / SHARE
         more = count - len(traced.points) + len(traced.events)
         budget = here.searched + max(SEARCHED, more)
-        part = _Piece(here, ahead[0], stride, more, budget, [now], watch=watch, missing=missing).traced()
+        piece = _Piece(here, ahead[0], stride, more, budget, [now], watch=watch, missing=missing, passed=passed)
+        part = piece.traced()
         # A path that touches the end of its range may be singular there, and rounding puts that beyond.
         events = [event for event in part.events if span[0] <= event.standing.factor <= span[1]]
         outside = {id(event.standing) for event in part.events} - {id(event.standing) for event in events}
@@ -252,8 +255,8 @@ class _Piece:
     """A stretch of a curve within one piece of the histories, in steps that change the factor by a stride at most.
 
     ``more`` is the number of steps that are still to be taken, ``budget`` the value of ``curve.searched`` at which the
-    stretch is given up; ``missing`` and ``missed`` are as of :func:`trace` and :class:`Traced`.  ``curve`` is that on
-    which the next step goes.
+    stretch is given up; ``missing``, ``missed`` and ``passed`` are as of :func:`trace` and :class:`Traced`.  ``curve``
+    is that on which the next step goes.
     """
 
     curve: Curve
@@ -271,6 +274,7 @@ class _Piece:
     crossed: tuple[int, ...] = ()
     missing: float = np.inf
     missed: float = 0.0
+    passed: Callable[[Standing, Standing], bool] | None = None
 
     def traced(self) -> Traced:
         """The stretch from its first point on."""
@@ -291,6 +295,8 @@ class _Piece:
         """The next point, None if the step is refused, and the length of the next step."""
         curve, length = self.curve, min(length, _longest(self.curve, now, self.stride))
         there, left = _ahead(curve, now, self.before, length, self.span)
+        if there is not None and self.passed is not None and self.passed(now, there):
+            return None, 0.5 * length
         there = None if there is None else self._within_margins(now, there)
         corner = there is None and curve.remembers and 0.5 * length <= SHORTEST
         if corner:

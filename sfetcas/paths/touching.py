@@ -1,0 +1,505 @@
+"""Places where members touch each other or obstacles, without friction, as conditions along a path.
+
+While the same places touch, where they are on the members are unknowns like any other, see
+:mod:`~sfetcas.mechanics.contact_points`.  The margins are the gaps where members are nearest to something and do not
+touch; the pushes where they do; how far a place is from the ends of its member or, where it stays at one, how much the
+gap grows beside it; and the curvature of the gap, without which a member begins to lie along what it touches.
+
+What begins to touch pushes with no force, which is nowhere: at first it stays where it is and pushes along a given
+normal, which is right to first order.  A little farther on it slides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from ..contact.closest import Near
+from ..contact.lines import points_in, points_of
+from ..contact.member_contact import MemberContact
+from ..description.records import enumerated
+from ..description.scene import Scene
+from ..equilibria.member_contact_steps import undeformed
+from ..equilibria.solution import Equilibrium
+from ..errors import LIMITS, SolveError, Status
+from ..mathematics.arrays import Array
+from ..mechanics.equations import State
+from ..mechanics.fields import Fields
+from ..mechanics.mesh import ContactPoint, Mesh
+from ..solvers.arclength import Curve, Standing, Tangent
+from ..solvers.beginning import begin_path, begun_at, beside_zero
+from ..solvers.prepared import Prepared, Solved
+from ..solvers.redundancy import redundant
+from .conditions import NEAR, Begun, Choice, Conditions, Way
+
+__all__ = ["Touching"]
+
+REACH = 0.1
+"""Gaps that are larger are as good as this, sizes of the scene: what is far from touching is not looked for."""
+
+ONWARD = 1e-4
+"""Arc length beyond which what has begun to touch slides: its place is known to so many digits less than its force."""
+
+OPEN = 1.0
+"""Margin of what is no condition in a choice."""
+
+
+@dataclass(frozen=True)
+class _At:
+    """A place of a contact.
+
+    Attributes
+    ----------
+    contact : str
+    members : (str, str) or (str,)
+    at : tuple of float
+        Fractions of their lengths.
+    """
+
+    contact: str
+    members: tuple[str, ...]
+    at: tuple[float, ...]
+
+    @property
+    def pair(self) -> tuple[str, tuple[str, ...]]:
+        """The record and its members."""
+        return self.contact, self.members
+
+    def told(self, verb: str) -> str:
+        """What it does in a sentence: ``contacts.peg touches beam at 0.5``."""
+        places = [f"{member} at {x:.4g}" for member, x in zip(self.members, self.at, strict=True)]
+        if len(places) == 1:
+            return f"contacts.{self.contact} {verb} {places[0]}"
+        return f"contacts.{self.contact}: {f' {verb} '.join(places)}"
+
+
+@dataclass(frozen=True)
+class _Touch(_At):
+    """A place where something is nearest.
+
+    Attributes
+    ----------
+    active : bool
+        Whether it touches.
+    normal : vector
+        As of :class:`~sfetcas.contact.closest.Near`.
+    """
+
+    active: bool
+    normal: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class _End(_At):
+    """A place that touches at an end of a member, on which it may slide, or stay where it ends.
+
+    Attributes
+    ----------
+    side : int
+        Whether it is that on the first or the second member.
+    member : str
+        The one on which it may slide: that of the place or another one with the same node.
+    end : int
+        Which end of it this is, 0 or 1.
+    """
+
+    side: int
+    member: str
+    end: int
+
+
+@dataclass(frozen=True)
+class _Flat(_At):
+    """A place where the gap is not curved."""
+
+
+@dataclass(frozen=True)
+class _Driven(_At):
+    """A node that is held, and is led onto an obstacle."""
+
+
+class Touching(Conditions[_At]):
+    """Places of a scene that touch.
+
+    Parameters
+    ----------
+    scene : Scene
+    prepare : callable
+        Mesh -> Prepared.
+    accuracy : float
+        Wanted error of the positions over the size of the scene.
+    fixed : collection of str
+        Members whose mesh is prescribed.
+    beside : callable
+        The equilibrium at a factor by itself, on a mesh of its own.
+    """
+
+    kinds: ClassVar[str] = "places that touch"
+    choosing: ClassVar[str] = "what touches"
+
+    def __init__(
+        self,
+        scene: Scene,
+        prepare: Callable[[Mesh], Prepared],
+        accuracy: float,
+        fixed: Collection[str],
+        beside: Callable[[float], Equilibrium],
+    ) -> None:
+        self.scene, self.beside = scene, beside
+        self.run = MemberContact(scene, prepare, accuracy, fixed)
+        self.closest = self.run.closest
+        self.reach = REACH * scene.size
+
+    @property
+    def any(self) -> bool:
+        """As of :class:`.Conditions`."""
+        return bool(self.closest.pairs)
+
+    def made(self, prepared: Prepared) -> Prepared:
+        """As of :class:`.Conditions`."""
+        # Seen without contact, as in statics.
+        prepared.equations.redundant = self.run.redundant
+        return prepared
+
+    # -- begin ----------------------------------------------------------------------------------
+
+    def begin(self, prepared: Callable[[Choice], Prepared], span: tuple[float, float], first: Choice) -> Begun:
+        """As of :class:`.Conditions`: without contact if nothing penetrates then, else as statics finds it."""
+        pilot = prepared(Choice())
+        zero = undeformed(pilot)
+        self.run.redundant = redundant(pilot.equations, zero.point)
+        self.made(pilot)
+        self.run.refuse_penetrating(zero.fields)
+        try:
+            found = begin_path(pilot, span)
+        except SolveError as error:
+            if error.status in LIMITS:
+                raise
+        else:
+            if self.run.unstopped(zero, found[1]):
+                return found
+        try:
+            return self._begun(prepared, span, 0.0, ())
+        except SolveError:
+            factor = beside_zero(span)
+            note = f"at factor 0 nothing tells which way the path goes: it starts at factor {factor:g}"
+            return self._begun(prepared, span, factor, (note,))
+
+    def _begun(
+        self, prepared: Callable[[Choice], Prepared], span: tuple[float, float], factor: float, notes: tuple[str, ...]
+    ) -> Begun:
+        """The first point at a factor at which something touches already."""
+        near, mesh = self.beside(factor), prepared(Choice()).model.mesh
+        own = Prepared(near.model)
+        source = Solved(own, near.state, near.loading, own.equations.at(near.state, near.loading), 0.0)
+        points, found = points_of(source), None
+        lines = [point for point in points if point.line]
+        if not lines:
+            found = self.run.resolved(mesh, points, source, lambda model: model.loading(factor))
+            lines = [point for point in points if self.run.lines.has(point)]
+        if lines:
+            raise SolveError(Status.FAILED, _lying(lines), near.state)
+        if found is None:
+            detail = f"what touches at factor {factor:g} was not found on the mesh of the path"
+            raise SolveError(Status.FAILED, detail, near.state)
+        return begun_at(prepared(Choice.of(found.model.mesh)), found.state, factor, notes, span)
+
+    # -- margins --------------------------------------------------------------------------------
+
+    def watched(self, fields: Fields) -> Array:
+        """As of :class:`.Conditions`."""
+        return np.array([margin for _, margin in self._margins(fields)])
+
+    def near(self, fields: Fields, crossed: Sequence[int] = ()) -> list[_At]:
+        """As of :class:`.Conditions`."""
+        found, points = self._margins(fields), points_in(fields)
+        close = [one for one, margin in found if abs(margin) <= NEAR and not isinstance(one, _Driven)]
+        close += [_touch(one) for one in self._free(fields, points, NEAR * fields.model.scales.length)]
+        close += [end for point in points for end, margin in self._beyond(fields, point) if abs(margin) <= NEAR]
+        wanted = [found[i][0] for i in crossed] + close
+        new = [one for one in wanted if isinstance(one, _Touch) and not one.active]
+        wanted += [_Flat(*one.pair, one.at) for one in new if self._bend(fields, one) <= NEAR]
+        return list(dict.fromkeys(wanted))
+
+    def margin(self, fields: Fields, which: Sequence[_At]) -> Array:
+        """As of :class:`.Conditions`."""
+        points = points_in(fields)
+        return np.array([self._margin(fields, points, one) for one in which])
+
+    def _margins(self, fields: Fields) -> list[tuple[_At, float]]:
+        """Conditions and their margins, as many in each state with the same places."""
+        points, scales = points_in(fields), fields.model.scales
+        nearest: dict[tuple[str, tuple[str, ...]], Near] = {}
+        for near in self._free(fields, points, self.reach):
+            if near.pair not in nearest or near.gap < nearest[near.pair].gap:
+                nearest[near.pair] = near
+        found = list[tuple[_At, float]]()
+        for key in self.closest.pairs:
+            one = nearest.get(key)
+            gap = self.reach if one is None else one.gap
+            found.append((_Touch(*key, (), False) if one is None else _touch(one), gap / scales.length))
+        found += [(one, gap / scales.length) for one, gap in self._held(fields)]
+        for point, begun in zip(points, fields.model.mesh.points, strict=True):
+            push = fields.contact_point(begun)["push"]
+            found.append((_Touch(*point.pair, point.at, True), push / scales.force))
+            found += list(self._own_ends(fields, point))
+            if any(point.slides):
+                found.append((_Flat(*point.pair, point.at), self._bend(fields, point)))
+        return found
+
+    def _margin(self, fields: Fields, points: Sequence[ContactPoint], one: _At) -> float:
+        """The margin of a condition at a state near to that at which it was told."""
+        scales = fields.model.scales
+        there = [i for i, point in enumerate(points) if self._same_place(point, one)]
+        if isinstance(one, _Touch):
+            if there:
+                return float(fields.contact_point(fields.model.mesh.points[there[0]])["push"] / scales.force)
+            found = self.closest.found(fields, self.reach, [self.closest.pairs[one.pair]])
+            lengths = [self.closest.lengths[member] for member in one.members]
+
+            def apart(near: Near) -> float:
+                return max(abs(x - y) * length for x, y, length in zip(near.at, one.at, lengths, strict=True))
+
+            gap = min(found, key=apart).gap if found else self.reach
+            return float(gap / scales.length)
+        if isinstance(one, _End) and there:
+            point = points[there[0]]
+            if not point.slides[one.side]:
+                return self._inward(fields, point, one)
+            if point.members[one.side] == one.member:
+                return self._from_end(fields, point, one.side, one.end)
+        return OPEN
+
+    def _same_place(self, point: ContactPoint, one: _At) -> bool:
+        """Whether a point is at a place, or has gone over from there to another member with the same node."""
+        if point.pair == one.pair:
+            return self.closest.alike(one.pair, point.at, one.at)
+        return isinstance(one, _End) and point.contact == one.contact and one.member in point.members
+
+    def _free(self, fields: Fields, points: Sequence[ContactPoint], reach: float) -> list[Near]:
+        """Where something is nearer than ``reach``, m, and none of the points is."""
+        return [n for n in self.closest.found(fields, reach) if not any(self._same(fields, n, p) for p in points)]
+
+    def _same(self, fields: Fields, near: Near, point: ContactPoint) -> bool:
+        """Whether something is nearest where a point is: also where the member of the one ends at that of the other."""
+        if near.contact != point.contact:
+            return False
+        if near.pair == point.pair:
+            return self.closest.alike(near.pair, near.at, point.at, ONE)
+        nodes = [[self._node(m, x) for m, x in zip(one.members, one.at, strict=True)] for one in (near, point)]
+        same = [a == b and a is not None for a, b in zip(*nodes, strict=True)]
+        return all(
+            one or (m == n and abs(x - y) * self.closest.lengths[m] < ONE * self.closest.pairs[near.pair].width)
+            for one, m, n, x, y in zip(same, near.members, point.members, near.at, point.at, strict=True)
+        )
+
+    def _node(self, member: str, at: float) -> str | None:
+        """The node at a place of a member, if there is one."""
+        return self.scene.members[member].nodes[int(at)] if at in (0.0, 1.0) else None
+
+    # -- ends -----------------------------------------------------------------------------------
+
+    def _own_ends(self, fields: Fields, point: ContactPoint) -> Iterator[tuple[_End, float]]:
+        """Ends of the members of a point: how far it is from where it slides to, and what keeps it where it stays."""
+        for side, (member, x) in enumerate(zip(point.members, point.at, strict=True)):
+            if point.slides[side]:
+                for end in (0, 1):
+                    one = _End(*point.pair, point.at, side, member, end)
+                    yield one, self._from_end(fields, point, side, end)
+            elif x in (0.0, 1.0):
+                for one in self._at_node(point, side):
+                    yield one, self._inward(fields, point, one)
+
+    def _beyond(self, fields: Fields, point: ContactPoint) -> Iterator[tuple[_End, float]]:
+        """What goes on beyond ends of members that a point has come to, and how the gap grows there."""
+        for side, x in enumerate(point.at):
+            end = round(x)
+            if point.slides[side] and abs(x - end) * self.closest.lengths[point.members[side]] <= self._close(fields):
+                at = tuple(float(end) if i == side else y for i, y in enumerate(point.at))
+                there = replace(point, at=at)
+                for one in self._at_node(there, side):
+                    if one.member != point.members[side]:
+                        yield replace(one, at=point.at), self._inward(fields, there, one)
+
+    def _close(self, fields: Fields) -> float:
+        return NEAR * fields.model.scales.length
+
+    def _at_node(self, point: ContactPoint, side: int) -> Iterator[_End]:
+        """The members on which a point at an end of one of its members may slide."""
+        node = self._node(point.members[side], point.at[side])
+        for name in self.closest.members:
+            for end, other in enumerate(self.scene.members[name].nodes):
+                if other == node and self._on(point, side, name, end) is not None:
+                    yield _End(*point.pair, point.at, side, name, end)
+
+    def _on(self, point: ContactPoint, side: int, member: str, end: int) -> ContactPoint | None:
+        """A point at the end of another member of the same node; None where that cannot touch."""
+        members = tuple(member if i == side else m for i, m in enumerate(point.members))
+        at = tuple(float(end) if i == side else x for i, x in enumerate(point.at))
+        slides = point.slides
+        if (point.contact, members) not in self.closest.pairs:
+            members, at, slides = members[::-1], at[::-1], slides[::-1]
+        pair = self.closest.pairs.get((point.contact, members))
+        if pair is None:
+            return None
+        return replace(point, members=members, at=at, slides=slides, distance=pair.distance)
+
+    def _from_end(self, fields: Fields, point: ContactPoint, side: int, end: int) -> float:
+        """How far a point is from an end of a member, below zero beyond it."""
+        share = 1.0 - point.at[side] if end else point.at[side]
+        return share * self.closest.lengths[point.members[side]] / fields.model.scales.length
+
+    def _inward(self, fields: Fields, point: ContactPoint, one: _End) -> float:
+        """Slope of the gap from an end of a member to its inside."""
+        there = self._on(point, one.side, one.member, one.end)
+        assert there is not None
+        slope = self.closest.slopes(fields, there.pair, there.at)[there.members.index(one.member)]
+        return float(-slope if one.end else slope)
+
+    def _held(self, fields: Fields) -> Iterator[tuple[_Driven, float]]:
+        """Ends of members that no obstacle can push, and their gaps, m."""
+        for pair in self.closest.pairs.values():
+            if pair.stop is None:
+                continue
+            (member,), radius = pair.members, self.scene.contacts[pair.contact].member_radius
+            for end, free in enumerate(pair.ends):
+                if not free and self.scene.members[member].nodes[end] != pair.stop.carrier:
+                    x = np.array([float(end)])
+                    seen = fields.seen(pair.contact, fields.positions(member, x), fields.tangents(member, x))
+                    yield _Driven(*pair.key, (float(end),)), float(pair.stop.gaps(*seen)[0]) - radius
+
+    def _bend(self, fields: Fields, one: _At | ContactPoint) -> float:
+        """Least curvature of the gap along what a place slides on, dimensionless."""
+        inside = [i for i, x in enumerate(one.at) if 0.0 < x < 1.0]
+        if not inside:
+            return OPEN
+        if len(one.members) == 1:
+            return self.closest.bends(fields, one.pair, one.at[0])[1] * fields.model.scales.length
+        curvature = self.closest.half_square(fields, (one.members[0], one.members[1]), (one.at[0], one.at[1]))[1]
+        return float(np.linalg.eigvalsh(curvature[np.ix_(inside, inside)])[0])
+
+    # -- changes --------------------------------------------------------------------------------
+
+    def where(self, one: _At) -> str:
+        """As of :class:`.Conditions`."""
+        return f"contacts.{one.contact}"
+
+    def active(self, one: _At, choice: Choice) -> bool:
+        """As of :class:`.Conditions`."""
+        return isinstance(one, _Touch) and any(self._same_place(point, one) for point in choice.points)
+
+    def becomes(self, one: _At, choice: Choice) -> str:
+        """As of :class:`.Conditions`."""
+        if isinstance(one, _End):
+            stays = one.member == one.members[one.side] and self._slides(one, choice)
+            return f"contacts.{one.contact} {'comes to the end of' if stays else 'goes on along'} {one.member}"
+        return one.told("leaves" if self.active(one, choice) else "touches")
+
+    def told(self, one: _At, choice: Choice) -> str:
+        """As of :class:`.Conditions`."""
+        if isinstance(one, _End):
+            return f"contacts.{one.contact} {'along' if self._slides(one, choice) else 'at the end of'} {one.member}"
+        return f"contacts.{one.contact} {'touching' if self.active(one, choice) else 'apart'}"
+
+    def _slides(self, one: _End, choice: Choice) -> bool:
+        """Whether a place slides on the member of a condition."""
+        return any(
+            point.slides[one.side] and point.members[one.side] == one.member
+            for point in choice.points
+            if self._same_place(point, one)
+        )
+
+    def refused(self, fields: Fields, near: Sequence[_At]) -> str:
+        """As of :class:`.Conditions`."""
+        for one in near:
+            if isinstance(one, _Driven):
+                return f"node {self._node(one.members[0], one.at[0])} is led into contacts.{one.contact}"
+        flat = [one for one in near if isinstance(one, _Flat)]
+        return _lying(flat) if flat else ""
+
+    def switched(self, fields: Fields, which: Sequence[_At]) -> Choice | None:
+        """As of :class:`.Conditions`: the places begin where they are now."""
+        touches = [one for one in which if isinstance(one, _Touch)]
+        ends = [one for one in which if isinstance(one, _End)]
+        kept: list[ContactPoint] = []
+        for point in points_in(fields):
+            if any(one.active and self._same_place(point, one) for one in touches):
+                continue
+            own = [one for one in ends if one.pair == point.pair and one.at == point.at]
+            moved = self._at_ends(point, own)
+            if moved is None:
+                return None
+            kept.append(moved)
+        for one in touches:
+            if not one.active:
+                distance, still = self.closest.pairs[one.pair].distance, (False,) * len(one.at)
+                kept.append(ContactPoint(*one.pair, one.at, still, distance, normal=one.normal, new=True))
+        return Choice(points=tuple(self.run.lines.set_out(fields.model.mesh, kept)))
+
+    def _at_ends(self, point: ContactPoint, ends: Sequence[_End]) -> ContactPoint | None:
+        """A point that leaves members at their ends or goes on along others; None where it would do so along two."""
+        for side in range(len(point.members)):
+            own = [one for one in ends if one.side == side]
+            enter = [one for one in own if not (point.slides[side] and point.members[side] == one.member)]
+            if len(enter) > 1:
+                return None
+            if own:
+                one = (enter or own)[0]
+                there = self._on(point, side, one.member, one.end)
+                assert there is not None
+                place = there.members.index(one.member)
+                slides = tuple(bool(enter) if i == place else free for i, free in enumerate(there.slides))
+                point = replace(there, slides=slides)
+        return point
+
+    def carried(self, at: Standing, prepared: Prepared) -> State:
+        """As of :class:`.Conditions`."""
+        return self.run.carried(at, prepared)
+
+    def onward(
+        self, way: Way, curve: Callable[[Choice], Curve], span: tuple[float, float]
+    ) -> tuple[Curve, Standing] | None:
+        """As of :class:`.Conditions`."""
+        if not any(point.new for point in way.choice.points):
+            return None
+        here = way.standing
+        there = way.curve.corrected(*way.curve.predicted(here, ONWARD), here.tangent, here.arc + ONWARD)
+        if there is None or not span[0] <= there.factor <= span[1]:
+            return None
+        free = [self._freed(there.fields, point) if point.new else point for point in points_of(there)]
+        onward = curve(Choice(points=tuple(self.run.lines.set_out(there.model.mesh, free))))
+        along = Tangent(np.zeros(onward.equations.total), there.tangent.factor)
+        rest = onward.standing(self.run.carried(there, onward.prepared), there.factor, along, arc=there.arc)
+        found = onward.corrected(rest.state, rest.factor, rest.tangent, there.arc)
+        return None if found is None else (onward, found)
+
+    def _freed(self, fields: Fields, point: ContactPoint) -> ContactPoint:
+        """A point that has begun to touch as it slides."""
+        ends = [(i, x) for i, x in enumerate(point.at) if x in (0.0, 1.0)]
+        at_end = {
+            i: self._inward(fields, point, _End(*point.pair, point.at, i, point.members[i], int(x))) for i, x in ends
+        }
+        slides = tuple(at_end.get(i, -1.0) < 0.0 for i in range(len(point.at)))
+        return replace(point, slides=slides, normal=self.closest.pairs[point.pair].normal, new=False)
+
+    def passed(self, before: Standing, after: Standing) -> bool:
+        """As of :class:`.Conditions`."""
+        return self.run.passed(before.fields, after.fields)
+
+
+ONE = 0.2
+"""Places nearer to each other than this share of what makes minima one are one, as in statics."""
+
+
+def _touch(near: Near) -> _Touch:
+    x, y, z = near.normal.tolist()
+    return _Touch(*near.pair, near.at, False, (x, y, z))
+
+
+def _lying(places: Sequence[_At | ContactPoint]) -> str:
+    """Why a path does not go on where members lie along something."""
+    names = enumerated(sorted({f"contacts.{one.contact}" for one in places}))
+    return f"a member begins to lie along {names}, accepted on a path: members that touch at places only"
