@@ -41,8 +41,8 @@ from .conditions import Choice, Conditions, Stopping
 from .contact_path import MARGIN, STEADY, follow_in_contact
 from .memory_path import HILL, MISSING, chosen_of, left_along, refined_by_fronts, sampled_again, steps_of
 from .path import NO_POTENTIAL, Branch, Path, PathPoint, TransitionPoint, ending
+from .switching import Choices, First, Followed, Transition
 from .touching import Touching
-from .switching import Choices, Followed, Transition
 from .vibrations import shaken, with_modes
 
 __all__ = ["buckling_mode", "follow_path", "switch"]
@@ -267,8 +267,7 @@ class PathTracing:
         if self.fixed == set(self.scene.members):
             errors = self._errors(coarse, self._level(self._halved(mesh)), whose=coarse)
             return self._answer(coarse, errors, begin)
-        # The error falls by 4^p a halving; less is taken for granted.
-        gain, stalled = 1.0 if self.scene.remembers else max(1.0, 4.0**mesh.order / MARGIN), 0
+        gain, stalled = self._gain(coarse), 0
         for count in range(LEVELS):
             coarse = self._with_fronts(coarse)
             fine = self._level(self._halved(coarse.curve.model.mesh))
@@ -281,6 +280,13 @@ class PathTracing:
             coarse, last = self._next(fine, gain * largest, gain), largest
         fine.notes += _disagreement(coarse, fine) if not np.isfinite(largest) else ()
         return self._answer(fine, errors, begin)
+
+    def _gain(self, level: _Level) -> float:
+        """By how much less the error is after a halving, at least."""
+        parts = [part for stretch in level.stretches for part in stretch.traced.parts]
+        within = any(any(point.slides) for part in parts for point in part.curve.model.mesh.points)
+        # It falls by 4^p, and less is taken for granted; not so where fronts, or forces at places, are within elements.
+        return 1.0 if self.scene.remembers or within else max(1.0, 4.0**level.curve.model.mesh.order / MARGIN)
 
     def _with_fronts(self, level: _Level) -> _Level:
         """The level on a mesh on which fronts leave little, if it is not that already."""
@@ -316,8 +322,7 @@ class PathTracing:
         if graded.elements <= max(2 * plain.elements, FEW_ELEMENTS):
             return graded
         choices = self.choices(plain)
-        curve, start, _ = choices.begin()
-        met = [point.factor for point in choices.follow(curve, start, self.points).points]
+        met = [point.factor for point in choices.follow(choices.begin()[0], self.points).points]
         return self._mesh((max(1.5 * min(met), self.span[0]), min(1.5 * max(met), self.span[1])))
 
     def _mesh(self, factors: tuple[float, ...]) -> Mesh:
@@ -353,8 +358,9 @@ class PathTracing:
 
     def _level(self, mesh: Mesh) -> _Level:
         choices = self.choices(mesh)
-        curve, start, notes = choices.begin(self.first)
-        main = _Stretch(choices.follow(curve, start, self.points, MISSING * self.accuracy))
+        first, notes = choices.begin(self.first)
+        main = _Stretch(choices.follow(first, self.points, MISSING * self.accuracy))
+        curve, start = first.curve, first.begins or first.standing
         way = max(abs(point.factor - start.factor) for point in main.traced.points)
         if main.traced.end == "bent" and way < LEAST_WAY * self._widest:
             assert main.traced.limit is not None
@@ -389,7 +395,7 @@ class PathTracing:
             level.notes += (f"bifurcation {number} to the side {side}: {which} leads along there and is listed once",)
             return
         known = [standing for part in level.stretches for standing in part.of_kind("bifurcation")]
-        followed = level.choices.follow(curve, first, self.analysis.points)
+        followed = level.choices.follow(First(curve, first), self.analysis.points)
         level.stretches.append(_Stretch(followed.without(known), number, side))
 
     def branch(
@@ -399,7 +405,7 @@ class PathTracing:
         first = switched(curve, event, shapes_at(curve, event), side, shape)
         if first is None or not self._in_range(first):
             return None
-        return choices.follow(curve, first, points).without([event.standing])
+        return choices.follow(First(curve, first), points).without([event.standing])
 
     def _in_range(self, standing: Standing) -> bool:
         return self.span[0] <= standing.factor <= self.span[1]

@@ -3,9 +3,9 @@
 Which strings are taut, which stops are active and which places touch is a choice, see :mod:`.conditions`.  While it
 holds the equilibria are a smooth curve, which is followed like any other.  Where a margin vanishes the curve ends.  A
 state there is an equilibrium of each choice that differs in what has no margin; of their curves those lead on along
-which no margin falls.  Where the energy of the choice with the fewest active constraints has a strict minimum there is at most
-one to either side of the factor, as rates and multipliers solve a strictly convex quadratic program.  Elsewhere all
-choices are looked at: there may be none, several, and the factor may turn.
+which no margin falls.  Where the energy of the choice with the fewest active constraints has a strict minimum there is
+at most one to either side of the factor, as rates and multipliers solve a strictly convex quadratic program.  Elsewhere
+all choices are looked at: there may be none, several, and the factor may turn.
 
 Source: Cottle, Pang and Stone 2009, The Linear Complementarity Problem, theorem 3.1.6.
 """
@@ -29,9 +29,9 @@ from ..solvers.beginning import begin_path
 from ..solvers.critical import Event, at_factors
 from ..solvers.prepared import Prepared
 from ..solvers.tracing import Traced, trace, without
-from .conditions import Begun, Choice, Conditions, Way
+from .conditions import Choice, Conditions, Way
 
-__all__ = ["Choices", "Followed", "Part", "Transition"]
+__all__ = ["Choices", "First", "Followed", "Part", "Transition"]
 
 NOTHING = Choice()
 """The choice in which nothing acts but strings, which are taut."""
@@ -73,6 +73,24 @@ class Part:
     def points(self) -> list[Standing]:
         """All of them."""
         return self.traced.points if self.begins is None else [self.begins, *self.traced.points]
+
+
+@dataclass(frozen=True, eq=False)
+class First:
+    """Where a part of a path begins.
+
+    Attributes
+    ----------
+    curve : Curve
+    standing : Standing
+        The point from which on the curve is followed.
+    begins : Standing or None
+        As of :class:`Part`.
+    """
+
+    curve: Curve
+    standing: Standing
+    begins: Standing | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,10 +218,10 @@ class Choices:
 
     # -- begin ----------------------------------------------------------------------------------
 
-    def begin(self, first: Choice = NOTHING) -> Begun:
-        """The first point, as of :func:`~sfetcas.solvers.beginning.begin_path`, in the choice that holds there.
+    def begin(self, first: Choice = NOTHING) -> tuple[First, tuple[str, ...]]:
+        """Where the path begins, as of :func:`~sfetcas.solvers.beginning.begin_path`, in the choice that holds there.
 
-        The search for it begins with ``first``.
+        The search for it begins with ``first``; with notes.
 
         Raises
         ------
@@ -211,21 +229,21 @@ class Choices:
             There is no equilibrium to start from, or none that tells in which choice the path goes on.
         """
         if not self.conditions.any:
-            found = begin_path(self.prepared(first), self.span)
-            self.unit = found[0].unit
-            return found
+            curve, start, notes = begin_path(self.prepared(first), self.span)
+            self.unit = curve.unit
+            return First(curve, start), notes
         curve, start, notes = self.conditions.begin(self.prepared, self.span, first)
         self.unit = curve.unit
         near = self.conditions.near(start.fields)
         if not near:
-            return curve, start, notes
+            return First(curve, start), notes
         up = 1.0 if self.span[1] > 0.0 else -1.0
         refused = self._refused(start, near)
         ways = [] if refused else self._ways(start, near, up, begins=True)
         if len(ways) != 1:
             why = refused or self._several(ways, near)
             raise SolveError(Status.FAILED, f"at its beginning {why}", start.state)
-        return *self._onward(ways[0]), notes
+        return self._onward(ways[0]), notes
 
     def _refused(self, at: Standing, near: Sequence[Any]) -> str:
         """Why the path does not go on from a point beyond which some conditions change; empty where it may."""
@@ -233,21 +251,23 @@ class Choices:
             return f"{len(near)} {self.conditions.kinds} change at once, accepted: at most {MOST}"
         return self.conditions.refused(at.fields, near)
 
-    def _onward(self, way: Way) -> tuple[Curve, Standing]:
-        """The curve of a way, and the first point on it that is followed."""
+    def _onward(self, way: Way) -> First:
+        """Where a way begins."""
+        beyond = self.conditions.onward(way, self.curve, self.span)
         # Curves are kept without a piece: they are followed over all of them.
-        return self.conditions.onward(way, self.curve, self.span) or (self.curve(way.choice), way.standing)
+        return First(self.curve(way.choice), way.standing) if beyond is None else First(*beyond, way.standing)
 
     # -- along ----------------------------------------------------------------------------------
 
-    def follow(self, curve: Curve, start: Standing, count: int, missing: float = np.inf) -> Followed:
+    def follow(self, first: First, count: int, missing: float = np.inf) -> Followed:
         """A path from a point on, over all changes of the choice; ``missing`` as of :func:`.trace`."""
-        found, tried, begins = Followed(), set[object](), None
+        found, tried = Followed(), set[object]()
         watch, passed = (self._watched, self.conditions.passed) if self.conditions.any else (None, None)
         while True:
             left = max(1, count - found.count) if found.parts else count
-            traced = trace(curve, start, self.span, left, self.knots, watch, missing, passed)
-            found.parts.append(Part(curve, traced, begins))
+            curve = first.curve
+            traced = trace(curve, first.standing, self.span, left, self.knots, watch, missing, passed)
+            found.parts.append(Part(curve, traced, first.begins))
             if traced.end != "margin":
                 return found
             at, choice = traced.points[-1], Choice.of(curve.model.mesh)
@@ -264,8 +284,7 @@ class Choices:
             turns = bool(at.tangent.factor * way.standing.tangent.factor < 0.0)
             changes = tuple(self.conditions.becomes(one, choice) for one in way.which)
             found.transitions.append(Transition(at, changes, turns, _said(at, way.standing, turns)))
-            curve, start = self._onward(way)
-            begins = None if start is way.standing else way.standing
+            first = self._onward(way)
 
     def _watched(self, standing: Standing) -> Array:
         """Margins (conditions,) of a point."""
@@ -275,22 +294,25 @@ class Choices:
         """The points at given factors, in their order along the path; where parts meet they are listed once."""
         found = list[Standing]()
         for part in followed.parts:
-            first = part.traced.points[0]
+            first, begins = part.points[0], part is followed.parts[0]
             met = at_factors(part.curve, part.traced.points, factors)
             if part.begins is not None:
-                found += self._beside(part.begins, part.curve, first, factors)
-            keeps = part is followed.parts[0]
-            found += met if keeps else [point for point in met if point is not first]
+                met = [*self._beside(part.begins, part.curve, part.traced.points[0], factors), *met]
+            found += [point for point in met if begins or point is not first]
         # A closed curve ends where it begins.
         last = followed.points[-1]
         return found[:-1] if followed.end == "closed" and last in found else found
 
     @staticmethod
     def _beside(begins: Standing, curve: Curve, first: Standing, factors: tuple[float, ...]) -> list[Standing]:
-        """The points at given factors beyond a change, up to the first one that is followed there."""
+        """The points at given factors from a change on, before the first one that is followed there."""
         low, high = sorted((begins.factor, first.factor))
-        met = [factor for factor in factors if low < factor < high or factor == first.factor]
-        found = [curve.at_factor(first, factor) for factor in sorted(met, reverse=bool(first.factor < begins.factor))]
+        met = [factor for factor in factors if low < factor < high]
+        start = [begins] if begins.factor in factors else []
+        found = [
+            *start,
+            *(curve.at_factor(first, factor) for factor in sorted(met, reverse=bool(first.factor < begins.factor))),
+        ]
         return [point for point in found if point is not None]
 
     # -- over a change --------------------------------------------------------------------------
@@ -343,6 +365,9 @@ class Choices:
         state, factor = curve.predicted(here, STEP)
         gaps = curve.equations.at(state, curve.loading(factor)).residual[curve.equations.unknowns :]
         if regular and np.abs(gaps).max(initial=0.0) > LOCKED * STEP:
+            return None
+        # What nothing holds along the way is in balance nowhere beyond.
+        if regular and curve.corrected(state, factor, here.tangent, sharp=False) is None:
             return None
         return Way(tuple(which), choice, curve, replace(here, arc=at.arc))
 

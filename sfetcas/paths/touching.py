@@ -43,6 +43,11 @@ REACH = 0.1
 ONWARD = 1e-4
 """Arc length beyond which what has begun to touch slides: its place is known to so many digits less than its force."""
 
+LEFT = 1e-8
+"""Push at which something ceases to touch, dimensionless: with none its place is not known, and with less the place is
+no direction in which the Lagrangian is clearly largest.
+"""
+
 OPEN = 1.0
 """Margin of what is no condition in a choice."""
 
@@ -244,7 +249,7 @@ class Touching(Conditions[_At]):
         found += [(one, gap / scales.length) for one, gap in self._held(fields)]
         for point, begun in zip(points, fields.model.mesh.points, strict=True):
             push = fields.contact_point(begun)["push"]
-            found.append((_Touch(*point.pair, point.at, True), push / scales.force))
+            found.append((_Touch(*point.pair, point.at, True), push / scales.force - LEFT))
             found += list(self._own_ends(fields, point))
             if any(point.slides):
                 found.append((_Flat(*point.pair, point.at), self._bend(fields, point)))
@@ -289,16 +294,27 @@ class Touching(Conditions[_At]):
             return False
         if near.pair == point.pair:
             return self.closest.alike(near.pair, near.at, point.at, ONE)
-        nodes = [[self._node(m, x) for m, x in zip(one.members, one.at, strict=True)] for one in (near, point)]
-        same = [a == b and a is not None for a, b in zip(*nodes, strict=True)]
-        return all(
-            one or (m == n and abs(x - y) * self.closest.lengths[m] < ONE * self.closest.pairs[near.pair].width)
-            for one, m, n, x, y in zip(same, near.members, point.members, near.at, point.at, strict=True)
-        )
+        return self._meet(near, point)
+
+    def _meet(self, one: Near | ContactPoint, other: Near | ContactPoint) -> bool:
+        """Whether places of a contact on other members are one, as these members have the same nodes there."""
+        if one.contact != other.contact:
+            return False
+        width = ONE * self.closest.pairs[one.pair].width
+
+        def alike(i: int, k: int) -> bool:
+            m, n, x, y = one.members[i], other.members[k], one.at[i], other.at[k]
+            node = self._node(m, x)
+            same = node is not None and node == self._node(n, y)
+            return same or (m == n and abs(x - y) * self.closest.lengths[m] < width)
+
+        ways = [(0, 1), (1, 0)] if len(one.members) == 2 else [(0,)]
+        return any(all(alike(i, k) for i, k in enumerate(way)) for way in ways)
 
     def _node(self, member: str, at: float) -> str | None:
         """The node at a place of a member, if there is one."""
-        return self.scene.members[member].nodes[int(at)] if at in (0.0, 1.0) else None
+        end = round(at)
+        return self.scene.members[member].nodes[end] if abs(at - end) < SAME_END and end in (0, 1) else None
 
     # -- ends -----------------------------------------------------------------------------------
 
@@ -457,7 +473,17 @@ class Touching(Conditions[_At]):
 
     def carried(self, at: Standing, prepared: Prepared) -> State:
         """As of :class:`.Conditions`."""
-        return self.run.carried(at, prepared)
+        state, axes = self.run.carried(at, prepared), prepared.model.element.axes
+        rows, known = ({name: i for i, name in enumerate(m.row_names)} for m in (prepared.model, at.model))
+        lam = state.lam.copy()
+        for former, now in zip(at.model.mesh.points, points_of(at), strict=True):
+            for point in prepared.model.mesh.points:
+                if point.pair != now.pair and self._meet(point, now):
+                    # The force goes over to another member with the place.
+                    forces = at.state.lam[[known[row] for row in former.rows(axes)]]
+                    forces[:-1] *= -1.0 if len(now.members) == 2 and point.members[0] == now.members[1] else 1.0
+                    lam[[rows[row] for row in point.rows(axes)]] = forces
+        return replace(state, lam=lam)
 
     def onward(
         self, way: Way, curve: Callable[[Choice], Curve], span: tuple[float, float]
@@ -489,6 +515,9 @@ class Touching(Conditions[_At]):
         """As of :class:`.Conditions`."""
         return self.run.passed(before.fields, after.fields)
 
+
+SAME_END = 1e-9
+"""Fractions of a length by which a place is off the end at which it is: they are compared to nine digits."""
 
 ONE = 0.2
 """Places nearer to each other than this share of what makes minima one are one, as in statics."""

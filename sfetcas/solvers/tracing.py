@@ -136,9 +136,9 @@ def trace(
     """Follow a curve from a point until the factor leaves the span, or for so many points.
 
     At the knots of histories the curve has a corner: it is followed from one to the next.  ``watch`` gives the margins
-    of a point (n,), dimensionless: where one of them falls below zero the curve ends.  ``passed`` says whether something
-    has passed through something else between two neighbours: then the step was too long.  Where members have memory
-    each point is one that the next remembers; a step leaves out ``missing`` of that, over its length, at most.
+    of a point (n,), dimensionless: where one of them falls below zero the curve ends.  ``passed`` says whether
+    something has passed through something else between two neighbours: then the step was too long.  Where members have
+    memory each point is one that the next remembers; a step leaves out ``missing`` of that, over its length, at most.
     """
     usual = start.inertia.zero
     start = curve.without_neutral(start) if usual and start.tangent.neutral is None else start
