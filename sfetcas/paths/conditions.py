@@ -168,6 +168,10 @@ class Conditions(ABC, Generic[One]):
         """The curve and the first point on it beyond a change; None where those of the way itself are these."""
         return None
 
+    def fitted(self, mesh: Mesh, fields: Fields) -> Mesh:
+        """The mesh with elements that end where something acts at a state; itself where they need not."""
+        return mesh
+
     def passed(self, before: Standing, after: Standing) -> bool:
         """Whether something has passed through something else from one point to the next."""
         return False

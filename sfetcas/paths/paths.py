@@ -26,7 +26,7 @@ from ..errors import SceneError, SolveError, Status
 from ..mathematics.threads import single_threaded
 from ..mechanics.accuracy import largest_difference
 from ..mechanics.displacements import Displacements
-from ..mechanics.fields import Fields, transferred
+from ..mechanics.fields import Fields
 from ..mechanics.law_limits import first_beyond_laws
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
@@ -267,7 +267,8 @@ class PathTracing:
         if self.fixed == set(self.scene.members):
             errors = self._errors(coarse, self._level(self._halved(mesh)), whose=coarse)
             return self._answer(coarse, errors, begin)
-        gain, stalled = self._gain(coarse), 0
+        # The error falls by 4^p a halving; less is taken for granted.
+        gain, stalled = 1.0 if self.scene.remembers else max(1.0, 4.0**mesh.order / MARGIN), 0
         for count in range(LEVELS):
             coarse = self._with_fronts(coarse)
             fine = self._level(self._halved(coarse.curve.model.mesh))
@@ -280,13 +281,6 @@ class PathTracing:
             coarse, last = self._next(fine, gain * largest, gain), largest
         fine.notes += _disagreement(coarse, fine) if not np.isfinite(largest) else ()
         return self._answer(fine, errors, begin)
-
-    def _gain(self, level: _Level) -> float:
-        """By how much less the error is after a halving, at least."""
-        parts = [part for stretch in level.stretches for part in stretch.traced.parts]
-        within = any(any(point.slides) for part in parts for point in part.curve.model.mesh.points)
-        # It falls by 4^p, and less is taken for granted; not so where fronts, or forces at places, are within elements.
-        return 1.0 if self.scene.remembers or within else max(1.0, 4.0**level.curve.model.mesh.order / MARGIN)
 
     def _with_fronts(self, level: _Level) -> _Level:
         """The level on a mesh on which fronts leave little, if it is not that already."""
@@ -412,7 +406,9 @@ class PathTracing:
 
     def stretch(self, part: _Stretch, choices: Choices) -> _Stretch:
         """A traced branch with the equilibria at the factors of ``analysis.steps`` added."""
-        return replace(part, crossings=choices.crossings(part.traced, self.analysis.steps))
+        crossings = choices.crossings(part.traced, self.analysis.steps)
+        fitted = [choices.again(point, point.factor) or point for point in crossings]
+        return replace(part, traced=choices.located(part.traced), crossings=fitted)
 
     # -- errors ---------------------------------------------------------------------------------
 
@@ -458,12 +454,10 @@ class PathTracing:
         """Largest difference of points of a coarse stretch when they are corrected on the fine mesh."""
         largest = 0.0
         for point in chosen_of(coarse.curve, traced, STEADY, SAMPLES):
-            curve = fine.choices.curve(Choice.of(point.model.mesh))
-            state = transferred(point.model, point.state, curve.model)
-            flat = Tangent(np.zeros(curve.equations.total), point.tangent.factor)
-            found = curve.at_factor(replace(point, state=state, tangent=flat), point.factor)
+            own = coarse.choices.again(point) or point
+            found = fine.choices.again(own, own.factor)
             if found is not None:
-                largest = max(largest, largest_difference(point.fields, found.fields))
+                largest = max(largest, largest_difference(own.fields, found.fields))
         return largest
 
     # -- answers --------------------------------------------------------------------------------
@@ -473,6 +467,7 @@ class PathTracing:
         branches = []
         for i, stretch in enumerate(level.stretches):
             own = {(kind, j): error for (k, kind, j), error in errors.items() if k == i}
+            stretch = replace(stretch, traced=level.choices.fitted(stretch.traced))
             branches.append(self.answered(curve.prepared, stretch, own))
         status = Status.SHORT if largest > self.accuracy and self.asked else Status.SOLVED
         if level.stretches[0].traced.end in ("lost", "bent", "margin"):

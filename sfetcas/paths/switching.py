@@ -12,24 +12,25 @@ Source: Cottle, Pang and Stone 2009, The Linear Complementarity Problem, theorem
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..description.records import enumerated
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
-from ..mechanics.fields import Fields
+from ..mechanics.fields import Fields, transferred
 from ..mechanics.mesh import Mesh
 from ..solvers.arclength import PASSING, Curve, Standing, Tangent
 from ..solvers.beginning import begin_path
-from ..solvers.critical import Event, at_factors
+from ..solvers.critical import Event, at_factors, events_between, sought
 from ..solvers.prepared import Prepared
 from ..solvers.tracing import Traced, trace, without
-from .conditions import Choice, Conditions, Way
+from .conditions import NEAR, Choice, Conditions, Way
 
 __all__ = ["Choices", "First", "Followed", "Part", "Transition"]
 
@@ -47,6 +48,15 @@ LOCKED = 1e-3
 
 ALIKE = 1e-6
 """Two ways on whose directions differ by less are one: a constraint that does nothing makes no other."""
+
+FITS = 3
+"""Times that elements are made to end where something acts: each leaves a thirtieth of how far that is off, or less."""
+
+BESIDE = (1e-3, 1e-2, 5e-2)
+"""Arc lengths before and behind an event between which it is located on a mesh that is made for it."""
+
+S = TypeVar("S", Event, Standing)
+"""What is located."""
 
 MOST = 6
 """Conditions without a margin at one point, at most: all choices of them may have to be looked at."""
@@ -106,12 +116,15 @@ class Transition:
     turns : bool
         Whether the factor turns there.
     notes : tuple of str
+    crossed : tuple of int
+        As of :class:`~sfetcas.solvers.tracing.Traced`.
     """
 
     standing: Standing
     changes: tuple[str, ...]
     turns: bool
     notes: tuple[str, ...]
+    crossed: tuple[int, ...] = ()
 
 
 @dataclass
@@ -208,9 +221,11 @@ class Choices:
     def prepared(self, choice: Choice = NOTHING) -> Prepared:
         """The model of a choice, ready to be solved."""
         if choice not in self._known:
-            prepared = self._prepare(replace(self.mesh, stops=choice.stops, points=choice.points))
-            self._known[choice] = self.conditions.made(prepared)
+            self._known[choice] = self._made(self.mesh, choice)
         return self._known[choice]
+
+    def _made(self, mesh: Mesh, choice: Choice) -> Prepared:
+        return self.conditions.made(self._prepare(replace(mesh, stops=choice.stops, points=choice.points)))
 
     def curve(self, choice: Choice) -> Curve:
         """The curve of a choice."""
@@ -283,7 +298,7 @@ class Choices:
             way = ways[0]
             turns = bool(at.tangent.factor * way.standing.tangent.factor < 0.0)
             changes = tuple(self.conditions.becomes(one, choice) for one in way.which)
-            found.transitions.append(Transition(at, changes, turns, _said(at, way.standing, turns)))
+            found.transitions.append(Transition(at, changes, turns, _said(at, way.standing, turns), traced.crossed))
             first = self._onward(way)
 
     def _watched(self, standing: Standing) -> Array:
@@ -297,14 +312,14 @@ class Choices:
             first, begins = part.points[0], part is followed.parts[0]
             met = at_factors(part.curve, part.traced.points, factors)
             if part.begins is not None:
-                met = [*self._beside(part.begins, part.curve, part.traced.points[0], factors), *met]
+                met = [*self._from(part.begins, part.curve, part.traced.points[0], factors), *met]
             found += [point for point in met if begins or point is not first]
         # A closed curve ends where it begins.
         last = followed.points[-1]
         return found[:-1] if followed.end == "closed" and last in found else found
 
     @staticmethod
-    def _beside(begins: Standing, curve: Curve, first: Standing, factors: tuple[float, ...]) -> list[Standing]:
+    def _from(begins: Standing, curve: Curve, first: Standing, factors: tuple[float, ...]) -> list[Standing]:
         """The points at given factors from a change on, before the first one that is followed there."""
         low, high = sorted((begins.factor, first.factor))
         met = [factor for factor in factors if low < factor < high]
@@ -314,6 +329,110 @@ class Choices:
             *(curve.at_factor(first, factor) for factor in sorted(met, reverse=bool(first.factor < begins.factor))),
         ]
         return [point for point in found if point is not None]
+
+    # -- elements that end where something acts -------------------------------------------------
+
+    def again(self, at: Standing, factor: float | None = None) -> Standing | None:
+        """A point, that may be of another mesh, where elements end where something acts; None if it is not found.
+
+        At a ``factor`` or, by default, across its tangent.
+        """
+        found: Standing | None = at
+        for _ in range(FITS):
+            mesh = self.conditions.fitted(self.mesh, at.fields)
+            own = at.model.mesh.same(replace(self.mesh, stops=at.model.mesh.stops, points=at.model.mesh.points))
+            if mesh is self.mesh and own and factor in (None, at.factor):
+                return found
+            curve = self._on(mesh, at)
+            found = self._onto(curve, at, factor)
+            if found is None or mesh is self.mesh:
+                return found
+            at = found
+        return found
+
+    def _on(self, mesh: Mesh, at: Standing) -> Curve:
+        """The curve of the choice of a point on a mesh."""
+        choice = Choice.of(at.model.mesh)
+        prepared = self.prepared(choice) if mesh is self.mesh else self._made(mesh, choice)
+        return Curve(prepared, self.unit, self._piece(at.factor, float(np.sign(at.tangent.factor))))
+
+    @staticmethod
+    def _onto(curve: Curve, at: Standing, factor: float | None) -> Standing | None:
+        """A point on the curve of another mesh."""
+        state = transferred(at.model, at.state, curve.model)
+        flat = Tangent(np.zeros(curve.equations.total), at.tangent.factor)
+        if factor is not None:
+            return curve.at_factor(replace(at, state=state, tangent=flat), factor)
+        across = curve.standing(state, at.factor, flat).tangent
+        return curve.corrected(state, at.factor, across, at.arc)
+
+    def located(self, followed: Followed) -> Followed:
+        """A path whose events and transitions are located where elements end where something acts then."""
+        parts, transitions = list[Part](), list[Transition]()
+        for part, change in itertools.zip_longest(followed.parts, followed.transitions):
+            found, events = dict[int, Standing](), list[Event]()
+            for event in part.traced.events:
+                there = self._sought(part.curve, event.standing, functools.partial(_event_of, event.kind)) or event
+                events.append(there)
+                found[id(event.standing)] = there.standing
+            if change is not None:
+                seek = functools.partial(self._crossed, change.crossed)
+                last = self._sought(part.curve, change.standing, seek) or change.standing
+                transitions.append(replace(change, standing=last))
+                found[id(change.standing)] = last
+            points = [found.get(id(point), point) for point in part.traced.points]
+            parts.append(replace(part, traced=replace(part.traced, points=points, events=events)))
+        return replace(followed, parts=parts, transitions=transitions)
+
+    def fitted(self, followed: Followed) -> Followed:
+        """A path all of whose points, but those that are located, are where elements end where something acts."""
+        known = {id(event.standing) for event in followed.events} | {id(t.standing) for t in followed.transitions}
+
+        start, ends = followed.points[0], (*self.span, *self.knots)
+
+        def again(point: Standing) -> Standing:
+            factor = point.factor if point is start or point.factor in ends else None
+            return point if id(point) in known else self.again(point, factor) or point
+
+        parts = list[Part]()
+        for part in followed.parts:
+            begins = None if part.begins is None else again(part.begins)
+            traced = replace(part.traced, points=[again(point) for point in part.traced.points])
+            parts.append(replace(part, traced=traced, begins=begins))
+        return replace(followed, parts=parts)
+
+    def _sought(self, curve: Curve, at: Standing, seek: Callable[[Curve, Standing, Standing], S | None]) -> S | None:
+        """What is sought between two points beside one where elements end where something acts; None if not found."""
+        found: S | None = None
+        for _ in range(FITS):
+            mesh = self.conditions.fitted(self.mesh, at.fields)
+            if mesh is self.mesh:
+                break
+            there = self._on(mesh, at)
+            found = self._beside(curve, at, there, seek) or found
+            if found is None:
+                break
+            curve, at = there, found.standing if isinstance(found, Event) else found
+        return found
+
+    def _beside(
+        self, curve: Curve, at: Standing, there: Curve, seek: Callable[[Curve, Standing, Standing], S | None]
+    ) -> S | None:
+        """What is sought on a curve of another mesh beside a point."""
+        for reach in BESIDE:
+            ways = (-reach, reach)
+            own = [curve.corrected(*curve.predicted(at, way), at.tangent, at.arc + way) for way in ways]
+            a, b = (None if point is None else self._onto(there, point, None) for point in own)
+            found = None if a is None or b is None else seek(there, a, b)
+            if found is not None:
+                return found
+        return None
+
+    def _crossed(self, crossed: Sequence[int], curve: Curve, a: Standing, b: Standing) -> Standing | None:
+        """Where the first of some margins vanishes between two points."""
+        points = [sought(curve, a, b, lambda point, i=i: float(self._watched(point)[i])) for i in crossed]  # type: ignore[misc]
+        zero = [p for p, i in zip(points, crossed, strict=True) if p is not None and abs(self._watched(p)[i]) <= NEAR]
+        return min(zero, key=lambda point: point.arc, default=None)
 
     # -- over a change --------------------------------------------------------------------------
 
@@ -395,6 +514,11 @@ class Choices:
             return f"no choice of {self.conditions.choosing} leads on: {names}"
         told = ["; ".join(self.conditions.told(one, way.choice) for one in near) for way in ways]
         return f"{len(ways)} ways lead on, and the path branches: {' or '.join(told)}"
+
+
+def _event_of(kind: str, curve: Curve, a: Standing, b: Standing) -> Event | None:
+    """The first event of a kind between two points."""
+    return next((event for event in events_between(curve, a, b) or [] if event.kind == kind), None)
 
 
 def _alike(a: Way, b: Way) -> bool:
