@@ -135,12 +135,12 @@ class Conditions(ABC, Generic[One]):
         """Where it stands in the scene."""
 
     @abstractmethod
-    def active(self, one: One, choice: Choice) -> bool:
-        """Whether it acts as a constraint in a choice."""
+    def active(self, one: One, fields: Fields) -> bool:
+        """Whether it acts as a constraint at a state."""
 
     @abstractmethod
-    def becomes(self, one: One, choice: Choice) -> str:
-        """What happens to it where it is switched in a choice, a sentence."""
+    def becomes(self, one: One, fields: Fields) -> str:
+        """What happens to it where it is switched at a state, a sentence."""
 
     @abstractmethod
     def told(self, one: One, choice: Choice) -> str:
@@ -149,6 +149,10 @@ class Conditions(ABC, Generic[One]):
     @abstractmethod
     def switched(self, fields: Fields, which: Sequence[One]) -> Choice | None:
         """The choice in which some are switched over; None where these exclude each other."""
+
+    def convex(self, which: Sequence[One]) -> bool:
+        """Whether a strict minimum leaves one way at most on which any of these may change."""
+        return True
 
     def refused(self, fields: Fields, near: Sequence[One]) -> str:
         """Why a path does not go on beyond a state, a sentence; empty where it may."""
@@ -223,13 +227,13 @@ class Stopping(Conditions[Unilateral]):
         """As of :class:`Conditions`."""
         return one.where
 
-    def active(self, one: Unilateral, choice: Choice) -> bool:
+    def active(self, one: Unilateral, fields: Fields) -> bool:
         """As of :class:`Conditions`."""
-        return one.active(choice.stops)
+        return one.active(fields.model.mesh.stops)
 
-    def becomes(self, one: Unilateral, choice: Choice) -> str:
+    def becomes(self, one: Unilateral, fields: Fields) -> str:
         """As of :class:`Conditions`."""
-        return one.becomes(choice.stops)
+        return one.becomes(fields.model.mesh.stops)
 
     def told(self, one: Unilateral, choice: Choice) -> str:
         """As of :class:`Conditions`."""

@@ -285,8 +285,8 @@ class Choices:
             found.parts.append(Part(curve, traced, first.begins))
             if traced.end != "margin":
                 return found
-            at, choice = traced.points[-1], Choice.of(curve.model.mesh)
-            tried = {choice.kind} if len(traced.points) > 1 else {*tried, choice.kind}
+            at, kind = traced.points[-1], Choice.of(curve.model.mesh).kind
+            tried = {kind} if len(traced.points) > 1 else {*tried, kind}
             near = self.conditions.near(at.fields, traced.crossed)
             found.ending = self._refused(at, near)
             if found.ending:
@@ -297,7 +297,7 @@ class Choices:
                 return found
             way = ways[0]
             turns = bool(at.tangent.factor * way.standing.tangent.factor < 0.0)
-            changes = tuple(self.conditions.becomes(one, choice) for one in way.which)
+            changes = tuple(self.conditions.becomes(one, at.fields) for one in way.which)
             found.transitions.append(Transition(at, changes, turns, _said(at, way.standing, turns), traced.crossed))
             first = self._onward(way)
 
@@ -441,8 +441,8 @@ class Choices:
 
         A choice holds along each; those that go the same way are one, in the choice with the fewest changes.
         """
-        choice = Choice.of(at.model.mesh)
-        unique = self._has_minimum(at, [one for one in near if self.conditions.active(one, choice)])
+        acting = [one for one in near if self.conditions.active(one, at.fields)]
+        unique = self.conditions.convex(near) and self._has_minimum(at, acting)
         found: list[Way] = []
         # What has led to the end of its choice cannot go on in it.
         for size in range(0 if begins else 1, len(near) + 1):

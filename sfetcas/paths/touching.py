@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..contact.closest import Near
-from ..contact.lines import points_in, points_of
+from ..contact.lines import LINE, points_in, points_of
 from ..contact.member_contact import MemberContact
 from ..description.records import enumerated
 from ..description.scene import Scene
@@ -404,30 +404,36 @@ class Touching(Conditions[_At]):
         """As of :class:`.Conditions`."""
         return f"contacts.{one.contact}"
 
-    def active(self, one: _At, choice: Choice) -> bool:
+    def active(self, one: _At, fields: Fields) -> bool:
         """As of :class:`.Conditions`."""
-        return isinstance(one, _Touch) and any(self._same_place(point, one) for point in choice.points)
+        return isinstance(one, _Touch) and one.active
 
-    def becomes(self, one: _At, choice: Choice) -> str:
+    def becomes(self, one: _At, fields: Fields) -> str:
         """As of :class:`.Conditions`."""
         if isinstance(one, _End):
-            stays = one.member == one.members[one.side] and self._slides(one, choice)
-            return f"contacts.{one.contact} {'comes to the end of' if stays else 'goes on along'} {one.member}"
-        return one.told("leaves" if self.active(one, choice) else "touches")
+            comes = self._slides(one, points_in(fields))
+            return f"contacts.{one.contact} {'comes to the end of' if comes else 'goes on along'} {one.member}"
+        return one.told("leaves" if self.active(one, fields) else "touches")
 
     def told(self, one: _At, choice: Choice) -> str:
         """As of :class:`.Conditions`."""
         if isinstance(one, _End):
-            return f"contacts.{one.contact} {'along' if self._slides(one, choice) else 'at the end of'} {one.member}"
-        return f"contacts.{one.contact} {'touching' if self.active(one, choice) else 'apart'}"
+            slides = self._slides(one, choice.points)
+            return f"contacts.{one.contact} {'along' if slides else 'at the end of'} {one.member}"
+        touches = any(self._same_place(point, one) for point in choice.points)
+        return f"contacts.{one.contact} {'touching' if touches else 'apart'}"
 
-    def _slides(self, one: _End, choice: Choice) -> bool:
-        """Whether a place slides on the member of a condition."""
+    def _slides(self, one: _End, points: Sequence[ContactPoint]) -> bool:
+        """Whether a place, one of some points, slides on the member of a condition."""
         return any(
             point.slides[one.side] and point.members[one.side] == one.member
-            for point in choice.points
+            for point in points
             if self._same_place(point, one)
         )
+
+    def convex(self, which: Sequence[_At]) -> bool:
+        """As of :class:`.Conditions`: what stays at an end of a member may be unstable while what slides is not."""
+        return all(isinstance(one, _Touch) for one in which)
 
     def refused(self, fields: Fields, near: Sequence[_At]) -> str:
         """As of :class:`.Conditions`."""
@@ -435,6 +441,11 @@ class Touching(Conditions[_At]):
             if isinstance(one, _Driven):
                 return f"node {self._node(one.members[0], one.at[0])} is led into contacts.{one.contact}"
         flat = [one for one in near if isinstance(one, _Flat)]
+        # As in statics so many places of two members are a line.
+        for one in near:
+            beside = [point for point in fields.model.mesh.points if point.pair == one.pair and len(point.members) == 2]
+            if isinstance(one, _Touch) and not one.active and len(beside) + 1 >= LINE:
+                flat.append(_Flat(*one.pair, one.at))
         return _lying(flat) if flat else ""
 
     def switched(self, fields: Fields, which: Sequence[_At]) -> Choice | None:
@@ -458,17 +469,20 @@ class Touching(Conditions[_At]):
 
     def _at_ends(self, point: ContactPoint, ends: Sequence[_End]) -> ContactPoint | None:
         """A point that leaves members at their ends or goes on along others; None where it would do so along two."""
+        turned = False
         for side in range(len(point.members)):
-            own = [one for one in ends if one.side == side]
-            enter = [one for one in own if not (point.slides[side] and point.members[side] == one.member)]
+            own, place = [one for one in ends if one.side == side], 1 - side if turned else side
+            enter = [one for one in own if not (point.slides[place] and point.members[place] == one.member)]
             if len(enter) > 1:
                 return None
             if own:
                 one = (enter or own)[0]
-                there = self._on(point, side, one.member, one.end)
+                there = self._on(point, place, one.member, one.end)
                 assert there is not None
-                place = there.members.index(one.member)
-                slides = tuple(bool(enter) if i == place else free for i, free in enumerate(there.slides))
+                # Pairs have an order.
+                after = place if there.members[place] == one.member else 1 - place
+                turned ^= after != place
+                slides = tuple(bool(enter) if i == after else free for i, free in enumerate(there.slides))
                 point = replace(there, slides=slides)
         return point
 

@@ -344,14 +344,19 @@ class _Piece:
         if watch is None:
             return there
         found: dict[int, Standing] = {}
+        unclear: list[int] = []
         for i in np.flatnonzero(watch(there) < -CROSSED).tolist():
             zero = sought(self.curve, now, there, lambda standing, i=i: float(watch(standing)[i]))  # type: ignore[misc]
             if zero is None or abs(watch(zero)[i]) > UNCLEAR:
-                return None
-            found[i] = zero
-        if not found:
+                unclear.append(i)
+            else:
+                found[i] = zero
+        first = min(found.values(), key=lambda standing: standing.arc, default=there)
+        # What is beyond the first one may have leapt.
+        if unclear and (first is there or (watch(first)[unclear] < -CROSSED).any()):
+            return None
+        if first is there:
             return there
-        first = min(found.values(), key=lambda standing: standing.arc)
         together = first.arc + ONE_EVENT * (there.arc - now.arc)
         self.crossed = tuple(i for i, standing in found.items() if standing.arc <= together)
         return first
