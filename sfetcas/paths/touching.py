@@ -49,6 +49,11 @@ LEFT = 1e-8
 no direction in which the Lagrangian is clearly largest.
 """
 
+STRAIGHT = 1e-4
+"""Curvature of a gap, dimensionless, below which a member begins to lie along something: at a free end it is zero, but
+for errors of the mesh.
+"""
+
 OPEN = 1.0
 """Margin of what is no condition in a choice."""
 
@@ -226,8 +231,8 @@ class Touching(Conditions[_At]):
         close += [_touch(one) for one in self._free(fields, points, NEAR * fields.model.scales.length)]
         close += [end for point in points for end, margin in self._beyond(fields, point) if abs(margin) <= NEAR]
         wanted = [found[i][0] for i in crossed] + close
-        new = [one for one in wanted if isinstance(one, _Touch) and not one.active]
-        wanted += [_Flat(*one.pair, one.at) for one in new if self._bend(fields, one) <= NEAR]
+        new = [one for one in wanted if isinstance(one, _End) or (isinstance(one, _Touch) and not one.active)]
+        wanted += [_Flat(*one.pair, one.at) for one in new if self._bend(fields, one) <= STRAIGHT]
         return list(dict.fromkeys(wanted))
 
     def margin(self, fields: Fields, which: Sequence[_At]) -> Array:
@@ -253,7 +258,7 @@ class Touching(Conditions[_At]):
             found.append((_Touch(*point.pair, point.at, True), push / scales.force - LEFT))
             found += list(self._own_ends(fields, point))
             if any(point.slides):
-                found.append((_Flat(*point.pair, point.at), self._bend(fields, point)))
+                found.append((_Flat(*point.pair, point.at), self._bend(fields, point) - STRAIGHT))
         return found
 
     def _margin(self, fields: Fields, points: Sequence[ContactPoint], one: _At) -> float:
@@ -389,14 +394,17 @@ class Touching(Conditions[_At]):
                     yield _Driven(*pair.key, (float(end),)), float(pair.stop.gaps(*seen)[0]) - radius
 
     def _bend(self, fields: Fields, one: _At | ContactPoint) -> float:
-        """Least curvature of the gap along what a place slides on, dimensionless."""
-        inside = [i for i, x in enumerate(one.at) if 0.0 < x < 1.0]
-        if not inside:
+        """Least curvature of the gap along what a place slides on, or begins to slide on, dimensionless."""
+        at = np.clip(one.at, 0.0, 1.0)
+        slopes = self.closest.slopes(fields, one.pair, tuple(at.tolist()))
+        free = np.flatnonzero(((at > 0.0) & (at < 1.0)) | (np.abs(slopes) <= NEAR))
+        if not len(free):
             return OPEN
         if len(one.members) == 1:
-            return self.closest.bends(fields, one.pair, one.at[0])[1] * fields.model.scales.length
-        curvature = self.closest.half_square(fields, (one.members[0], one.members[1]), (one.at[0], one.at[1]))[1]
-        return float(np.linalg.eigvalsh(curvature[np.ix_(inside, inside)])[0])
+            return self.closest.bends(fields, one.pair, float(at[0]))[1] * fields.model.scales.length
+        (first, second), (x, y) = one.members, at.tolist()
+        curvature = self.closest.half_square(fields, (first, second), (x, y))[1]
+        return float(np.linalg.eigvalsh(curvature[np.ix_(free, free)])[0])
 
     # -- changes --------------------------------------------------------------------------------
 
@@ -441,12 +449,14 @@ class Touching(Conditions[_At]):
             if isinstance(one, _Driven):
                 return f"node {self._node(one.members[0], one.at[0])} is led into contacts.{one.contact}"
         flat = [one for one in near if isinstance(one, _Flat)]
-        # As in statics so many places of two members are a line.
-        for one in near:
-            beside = [point for point in fields.model.mesh.points if point.pair == one.pair and len(point.members) == 2]
-            if isinstance(one, _Touch) and not one.active and len(beside) + 1 >= LINE:
-                flat.append(_Flat(*one.pair, one.at))
+        flat += [_Flat(*one.pair, one.at) for one in near if isinstance(one, _Touch) and self._lies(fields, one)]
         return _lying(flat) if flat else ""
+
+    def _lies(self, fields: Fields, new: _Touch) -> bool:
+        """Whether a place that begins to touch makes a line with others of two members, as in statics."""
+        beside = [point for point in points_in(fields) if point.pair == new.pair and len(point.members) == 2]
+        near = any(self.closest.alike(new.pair, new.at, point.at) for point in beside)
+        return not new.active and (near or len(beside) + 1 >= LINE)
 
     def switched(self, fields: Fields, which: Sequence[_At]) -> Choice | None:
         """As of :class:`.Conditions`: the places begin where they are now."""
