@@ -202,11 +202,6 @@ def test_wrong_input_is_told_in_one_sentence(contact, sentence):
     assert "\n" not in str(told.value)
 
 
-def test_what_contact_between_members_is_not_for():
-    with pytest.raises(SceneError, match="accepted: with 'static'"):
-        leaves(analysis={"type": "path", "range": [0, 1]})
-
-
 def test_members_that_penetrate_in_the_beginning_are_refused():
     with pytest.raises(SceneError, match=r"penetrate by 0\.01 m at .* of their lengths"):
         solve(leaves(contacts={"pair": {"type": "members", "members": "all", "radius": 0.03}}))

@@ -399,10 +399,6 @@ def scene(changes, kind="static"):
         ),
         ({"contacts.c": {"type": "point", "position": [1, 0], "side": [0, 1], "member": "beam", "node": "W"}}, "node"),
         ({"contacts.c": {"type": "members", "members": ["beam"], "radius": 0.01, "node": "W"}}, "node: not accepted"),
-        (
-            {"analysis": {"type": "path", "range": [0, 1]}},
-            "an obstacle that a node carries with analysis.type = 'path'",
-        ),
         ({"members.beam.type": "rigid", "contacts.c.node": "B", "nodes.W": None}, "an end of the rigid member 'beam'"),
     ],
 )

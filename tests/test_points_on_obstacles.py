@@ -140,7 +140,6 @@ def test_members_and_obstacles_together():
         (FLOOR | {"member_radius": -0.1}, {}, "zero or above"),
         (FLOOR | {"member_radius": "wide"}, {}, "member_radius"),
         (FLOOR | {"member_radius": 0.4}, {}, r"starts inside, by 0\.1 m"),
-        (FLOOR | {"member_radius": 0.1}, {"analysis": {"type": "path", "range": [0, 1]}}, "accepted: with 'static'"),
     ],
 )
 def test_wrong_input_is_told_in_one_sentence(contact, more, sentence):

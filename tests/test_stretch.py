@@ -551,9 +551,6 @@ def test_what_is_not_solved_is_refused():
     floor = {"floor": {"type": "plane", "point": [0, -1], "normal": [0, 1], "member": "m"}}
     with pytest.raises(SceneError, match=r"contacts.floor: found the member 'm', which shears, accepted"):
         strip(100.0, 40.0, contacts=floor)
-    drum = {"drum": {"type": "circle", "center": [0, -3], "radius": 1.0, "member": "m"}}
-    with pytest.raises(SceneError, match=r"contacts.drum: found an obstacle of 'm', which .* accepted: with 'static'"):
-        strip(100.0, None, contacts=drum, analysis={"type": "path", "range": [0, 1]})
 
 
 @pytest.mark.parametrize(("key", "words"), [("EA", "stretch"), ("GA2", "shear along b2")])

@@ -1047,8 +1047,8 @@ def _check_points(scene: Scene) -> None:
     where, found = ("contacts", name), f"found {what}"
     if scene.analysis.type != "static" and (scene.rubs or not on_path):
         message = f"{found} with analysis.type = {scene.analysis.type!r}"
-        known = {"friction": "'static', where the order of steps is known, or 'dynamic'", CARRIED: STEPPED}
-        accepted = known.get(what, "'static'")
+        known = {"friction": "'static', where the order of steps is known, or 'dynamic'"}
+        accepted = known.get(what, "'static' or 'path'")
         raise SceneError(f"{message}, accepted: with {accepted}", where)
     for edge, stop in scene.obstacles.items():
         if stop.kind == "sharp" and scene.contacts[edge].friction > 0.0:
@@ -1067,12 +1067,9 @@ def _why_points(scene: Scene, name: str) -> str:
     if contact.friction > 0.0 and scene.analysis.type != "dynamic":
         return "friction"
     if contact.node is not None and scene.analysis.type != "dynamic":
-        return CARRIED
+        return "an obstacle that a node carries"
     members = (m for m in members_of(contact, scene.members) if _of_points(scene, contact, m))
     return next((f"an obstacle of {member!r}, which has a law or stretches" for member in members), "")
-
-
-CARRIED, STEPPED = "an obstacle that a node carries", "'static' or 'dynamic'"
 
 
 def _check_between_members(scene: Scene, name: str) -> None:

@@ -8,6 +8,7 @@ bifurcations of a symmetric structure apart.
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
@@ -250,6 +251,7 @@ class PathTracing:
         self.assembly: Any = settings.assembly
         self.model: Model | None = None
         self.first = Choice()
+        self.base: Mesh | None = None
         self.conditions: Conditions[Any] = Stopping(scene)
         if scene.contacts:
             self.conditions = Touching(scene, self._prepared, self.accuracy, self.fixed, self._beside)
@@ -263,6 +265,7 @@ class PathTracing:
         """The path, with its branches, on a mesh fine enough for the accuracy."""
         begin = time.perf_counter()
         mesh, last = self._first_mesh(), np.inf
+        self.base = None if self.scene.remembers else mesh
         coarse = self._level(mesh)
         if self.fixed == set(self.scene.members):
             errors = self._errors(coarse, self._level(self._halved(mesh)), whose=coarse)
@@ -327,7 +330,10 @@ class PathTracing:
 
     def choices(self, mesh: Mesh, unit: float | None = None) -> Choices:
         """The models of a mesh, with the ``unit`` of a path that is known already."""
-        found = Choices(mesh, self._prepared, self.span, self.knots, self.conditions)
+        base = mesh if self.base is None else self.base
+        sizes = [(len(cuts) - 1) / (len(base.cuts[name]) - 1) for name, cuts in mesh.cuts.items()]
+        finer = functools.partial(self._halved, times=int(np.log2(max(sizes, default=1.0))))
+        found = Choices(mesh, self._prepared, self.span, self.knots, self.conditions, base, finer)
         found.unit = unit or found.unit
         return found
 
@@ -345,10 +351,12 @@ class PathTracing:
         analysis = self.analysis.model_copy(update={"type": "static", "steps": (factor,)})
         return solve(self.scene.model_copy(update={"analysis": analysis}), self.settings).last
 
-    def _halved(self, mesh: Mesh) -> Mesh:
+    def _halved(self, mesh: Mesh, times: int = 1) -> Mesh:
         everything = self.fixed == set(self.scene.members)
-        marks = {n: np.full(len(c) - 1, everything or n not in self.fixed) for n, c in mesh.cuts.items()}
-        return mesh.refined(marks)
+        for _ in range(times):
+            marks = {n: np.full(len(c) - 1, everything or n not in self.fixed) for n, c in mesh.cuts.items()}
+            mesh = mesh.refined(marks)
+        return mesh
 
     def _level(self, mesh: Mesh) -> _Level:
         choices = self.choices(mesh)

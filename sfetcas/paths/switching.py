@@ -204,6 +204,8 @@ class Choices:
         Factors at which histories have knots.
     conditions : Conditions
         What is one-sided.
+    base, finer
+        A mesh, and what makes ``mesh`` of it: that is made anew where elements of the first end elsewhere.
     """
 
     def __init__(
@@ -213,10 +215,13 @@ class Choices:
         span: tuple[float, float],
         knots: tuple[float, ...],
         conditions: Conditions[Any],
+        base: Mesh | None = None,
+        finer: Callable[[Mesh], Mesh] = lambda mesh: mesh,
     ) -> None:
         self.mesh, self.span, self.knots = replace(mesh, stops=(), points=()), span, knots
         self._prepare, self._known = prepare, dict[Choice, Prepared]()
         self.unit, self.conditions = max(map(abs, span)), conditions
+        self._base, self._finer = mesh if base is None else base, finer
 
     def prepared(self, choice: Choice = NOTHING) -> Prepared:
         """The model of a choice, ready to be solved."""
@@ -339,7 +344,7 @@ class Choices:
         """
         found: Standing | None = at
         for _ in range(FITS):
-            mesh = self.conditions.fitted(self.mesh, at.fields)
+            mesh = self._fit(at.fields)
             own = at.model.mesh.same(replace(self.mesh, stops=at.model.mesh.stops, points=at.model.mesh.points))
             if mesh is self.mesh and own and factor in (None, at.factor):
                 return found
@@ -349,6 +354,11 @@ class Choices:
                 return found
             at = found
         return found
+
+    def _fit(self, fields: Fields) -> Mesh:
+        """The mesh with elements that end where something acts at a state; itself where they need not."""
+        fitted = self.conditions.fitted(self._base, fields)
+        return self.mesh if fitted is self._base else self._finer(fitted)
 
     def _on(self, mesh: Mesh, at: Standing) -> Curve:
         """The curve of the choice of a point on a mesh."""
@@ -405,7 +415,7 @@ class Choices:
         """What is sought between two points beside one where elements end where something acts; None if not found."""
         found: S | None = None
         for _ in range(FITS):
-            mesh = self.conditions.fitted(self.mesh, at.fields)
+            mesh = self._fit(at.fields)
             if mesh is self.mesh:
                 break
             there = self._on(mesh, at)
