@@ -151,6 +151,8 @@ def test_crossing_rods_pressed_together():
         for node in ("a1", "b1"):
             np.testing.assert_allclose(step.position(node), alone.position(node), atol=2e-6)
         assert step.contacts["x"]["other_at"] == pytest.approx(alone.contacts["x"]["other_at"], abs=1e-5)
+    # Elements end at the places: with forces within elements it takes 256 of them.
+    assert path.model.mesh.elements <= 32
 
 
 def test_a_place_goes_over_a_node_from_member_to_member():
@@ -213,6 +215,49 @@ def test_statics_jumps_where_the_end_slips_off(off_a_log):
     for factor, number in ((0.25, 0), (1.0, 3)):
         # The accuracies of both.
         np.testing.assert_allclose(path.steps[number].position("B"), at(table, factor).position("B"), atol=2e-6)
+
+
+# -- obstacles that nodes carry -------------------------------------------------------------------
+
+
+def rising_drum(accuracy):
+    """A drum that rises and turns about a point beside it and winds a cantilever up: path to factor 1."""
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "B": {"position": [1, 0]},
+            "X": {"position": [0.6, -0.8], "support": "clamped"},
+            "Y": {"position": [0.6, -1.2]},
+        },
+        "members": {"a": {"nodes": ["A", "B"], "section": "s"}, "arm": {"type": "rigid", "nodes": ["X", "Y"]}},
+        "contacts": {
+            "c": {"type": "circle", "center": [0.65, -0.5], "radius": 0.3, "member_radius": 0.05, "node": "X"}
+            | {"member": "a"}
+        },
+        "motions": {"m": {"node": "X", "displacement": [-0.05, 0.6], "rotation": 0.7}},
+    }
+    return path_of(table, [0, 1], steps=[0.6, 1.0], accuracy=accuracy)
+
+
+def test_estimated_errors_are_those_of_the_path():
+    """The place ends near the clamp, where the element between them is halved from mesh to mesh like all others."""
+    coarse, fine = (rising_drum(accuracy) for accuracy in (1e-6, 1e-8))
+    for a, b in zip(coarse.steps, fine.steps, strict=True):
+        apart = np.linalg.norm(a.position("B") - b.position("B")) / coarse.scene.size
+        assert apart <= 1e-6
+        assert apart <= 2.0 * a.certificate.error_estimate + 1e-8
+        assert a.certificate.stable is True
+
+
+def test_a_roll_on_a_lever():
+    scene = load("problems/lever_presses_cantilever.toml")
+    path = solve(scene.replace(analysis={"type": "path", "range": [0, 1], "steps": [0.5, 1.0], "accuracy": 1e-6}))
+    assert told(path) == ["contacts.roll touches beam at 0.7001"]
+    statics = solve(scene.replace(analysis={"steps": [0.5, 1.0], "accuracy": 1e-6}))
+    for ours, theirs in zip(path.steps, statics.steps, strict=True):
+        np.testing.assert_allclose(ours.position("B"), theirs.position("B"), atol=2e-6)
+        np.testing.assert_allclose(ours.contacts["roll"]["force"], theirs.contacts["roll"]["force"], atol=1e-5)
 
 
 # -- symmetry, bifurcations, snapping -------------------------------------------------------------
