@@ -28,8 +28,7 @@ from ..errors import LIMITS, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
 from ..mechanics.fields import Fields
-from ..mechanics.mesh import ContactPoint, Mesh, breaks_of
-from ..mechanics.segments import SAME_CUT
+from ..mechanics.mesh import ContactPoint, Mesh
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.beginning import begin_path, begun_at, beside_zero
 from ..solvers.prepared import Prepared, Solved
@@ -529,23 +528,8 @@ class Touching(Conditions[_At]):
 
     def fitted(self, mesh: Mesh, fields: Fields) -> Mesh:
         """As of :class:`.Conditions`."""
-        cuts = dict(mesh.cuts)
-        for point in points_in(fields):
-            for member, x, slides in zip(point.members, point.at, point.slides, strict=True):
-                if slides and 0.0 < x < 1.0 and self.run.lines.bends(member) and member not in self.run.fixed:
-                    cuts[member] = self._with_end(cuts[member], member, x)
-        return mesh if all(cuts[name] is mesh.cuts[name] for name in cuts) else replace(mesh, cuts=cuts)
-
-    def _with_end(self, cuts: Array, member: str, x: float) -> Array:
-        """Ends of elements of a member with one at a place: a new one, or the nearest if it is near and may move."""
-        near = int(np.argmin(np.abs(cuts - x)))
-        if abs(cuts[near] - x) < SAME_CUT:
-            return cuts
-        e = int(np.searchsorted(cuts, x))
-        moves = np.abs(breaks_of(self.scene, member) - cuts[near]).min() > SAME_CUT
-        if moves and abs(cuts[near] - x) < SLIVER * (cuts[e] - cuts[e - 1]):
-            return np.where(np.arange(len(cuts)) == near, x, cuts)
-        return np.insert(cuts, e, x)
+        fitted = self.run.lines.fitted(mesh, points_in(fields))
+        return mesh if mesh.same(fitted) else fitted
 
     def _freed(self, fields: Fields, point: ContactPoint) -> ContactPoint:
         """A point that has begun to touch as it slides."""
@@ -560,9 +544,6 @@ class Touching(Conditions[_At]):
         """As of :class:`.Conditions`."""
         return self.run.passed(before.fields, after.fields)
 
-
-SLIVER = 0.2
-"""Share of an element within which its end is moved to a place instead of adding another one."""
 
 SAME_END = 1e-9
 """Fractions of a length by which a place is off the end at which it is: they are compared to nine digits."""
