@@ -89,17 +89,16 @@ def test_limit_load_of_a_beam_between_edges_that_become_sharp():
         del found[key]
     found["loads"] = {"F": {"type": "force", "node": "middle", "value": [0, -0.5]}}
     loads = []
-    for radius in (0.04, 0.02, 0.01):
+    for radius in (0.02, 0.01):
         edge = {"type": "circle", "center": [1, -radius], "radius": radius / 2, "member_radius": radius / 2}
         path = path_of(found | {"contacts": {"edge": edge | {"member": "half"}}}, [0, 1.8], accuracy=1e-5)
         assert path.status is Status.SOLVED
         loads.append(path.limit_points[0].factor)
         stable = {point.stable for point in path.points[: [p.kind for p in path.points].index("limit point")]}
         assert stable == {True}
-    once = [2.0 * b - a for a, b in zip(loads, loads[1:])]
-    # Extrapolated twice: what is left is of third order in the radius, a fifth of what it was in the once extrapolated.
-    assert (4.0 * once[1] - once[0]) / 3.0 == pytest.approx(LIMIT, rel=2e-5)
-    assert abs(loads[2] - LIMIT) > 1e-2
+    # Extrapolated: what is left is of second order in the radius, a fiftieth of the first.
+    assert 2.0 * loads[1] - loads[0] == pytest.approx(LIMIT, rel=5e-4)
+    assert loads[1] - LIMIT > 0.02
 
 
 # -- statics --------------------------------------------------------------------------------------
@@ -122,8 +121,10 @@ def test_a_place_touches_slides_and_leaves():
             continue
         # Forces are of order ten: a hundred times the accuracy asked for.
         np.testing.assert_allclose(step.contacts["c"]["force"], alone.contacts["c"]["force"], atol=1e-5)
-    points = [point for point in path.points if point.kind == "transition"]
-    assert len(points) == 2
+    points = [i for i, point in enumerate(path.points) if point.kind == "transition"]
+    # Each is there twice: before and after the change.
+    both = [[path.configuration(path.points[i + k]).contacts["c"]["at"] for k in (0, 1)] for i in points]
+    assert [[at is None for at in pair] for pair in both] == [[True, False], [False, True]]
     assert {point.stable for point in path.points} == {True}
 
 
@@ -242,11 +243,12 @@ def rising_drum(accuracy):
 
 def test_estimated_errors_are_those_of_the_path():
     """The place ends near the clamp, where the element between them is halved from mesh to mesh like all others."""
-    coarse, fine = (rising_drum(accuracy) for accuracy in (1e-6, 1e-8))
+    coarse, fine = (rising_drum(accuracy) for accuracy in (1e-5, 1e-7))
     for a, b in zip(coarse.steps, fine.steps, strict=True):
         apart = np.linalg.norm(a.position("B") - b.position("B")) / coarse.scene.size
-        assert apart <= 1e-6
-        assert apart <= 2.0 * a.certificate.error_estimate + 1e-8
+        assert apart <= 1e-5
+        # That of the finer one on top.
+        assert apart <= a.certificate.error_estimate + 1e-7
         assert a.certificate.stable is True
 
 
@@ -311,14 +313,14 @@ def test_a_snapped_arch_lands_on_a_drum_with_both_halves_at_once():
         "loads": {"F": {"type": "force", "node": "M", "value": [0, -1]}},
     }
     path, free = (
-        path_of({**table, "contacts": c}, [-10, 20], steps=[15.0], accuracy=1e-6) for c in (table["contacts"], {})
+        path_of({**table, "contacts": c}, [-10, 60], steps=[50.0], accuracy=1e-6) for c in (table["contacts"], {})
     )
     (landing,) = path.transitions
     assert [change.split(" at ")[0] for change in landing.changes] == ["contacts.w touches l", "contacts.w touches r"]
     # Until then the arch does not know of the drum.
     assert [e.factor for e in path.limit_points] == pytest.approx([e.factor for e in free.limit_points], rel=2e-6)
     assert [e.factor for e in path.bifurcations] == pytest.approx([e.factor for e in free.bifurcations], rel=2e-6)
-    alone = solve(Scene.from_dict({**table, "analysis": {"steps": [15.0], "accuracy": 1e-6}})).last
+    alone = solve(Scene.from_dict({**table, "analysis": {"steps": [50.0], "accuracy": 1e-6}})).last
     np.testing.assert_allclose(path.steps[-1].position("M"), alone.position("M"), atol=4e-6)
     places = path.steps[-1].contacts["w"]["at"]
     assert sum(places) == pytest.approx(1.0, abs=1e-6)

@@ -505,7 +505,8 @@ class Choices:
         if not self.prepared().model.scene.histories:
             return -np.inf, np.inf
         ends = (self.span[0], *self.knots, self.span[1])
-        pieces = [(a, b) for a, b in itertools.pairwise(ends) if a <= factor <= b]
+        within = min(max(factor, ends[0]), ends[-1])
+        pieces = [(a, b) for a, b in itertools.pairwise(ends) if a <= within <= b]
         return pieces[-1 if sign > 0.0 else 0]
 
     def _rates(self, way: Way, which: Sequence[Any]) -> list[float]:
