@@ -289,6 +289,28 @@ def test_an_arch_on_a_peg_bifurcates_in_contact(arch):
     assert {step.certificate.stable for step in with_peg} == {False}
 
 
+def test_a_thin_arch_on_a_thicker_peg_is_the_same(arch):
+    """Without a radius of members, too: nothing lies along the peg."""
+    table = pushed_arch()
+    table["contacts"]["peg"] = {"type": "circle", "center": [0, 0.35], "radius": 0.1, "member": "a"}
+    path = path_of(table, [0, 0.6], steps=[0.2], accuracy=1e-6)
+    # What is computed is the same but for rounding.
+    assert [e.factor for e in path.bifurcations] == pytest.approx([e.factor for e in arch.main.bifurcations], rel=1e-8)
+    assert told(path) == [change for entry in arch.main.transitions for change in entry.changes]
+    np.testing.assert_allclose(
+        path.steps[0].contacts["peg"]["force"], arch.steps[0].contacts["peg"]["force"], rtol=1e-7
+    )
+
+
+def test_what_lies_along_a_floor_is_followed_in_the_older_way():
+    floor = {"type": "plane", "point": [0, -0.05], "normal": [0, 1]}
+    found = cantilever(floor, loads={"w": {"type": "distributed", "member": "a", "value": [0, -1]}})
+    path = path_of(found, [0, 30], steps=[30.0], accuracy=1e-6)
+    assert any("bifurcations and branches are not looked for" in note for note in path.notes)
+    begin, end = path.steps[0].contacts["c"]["at"]
+    assert 0.0 < begin < end == 1.0
+
+
 def test_switching_to_a_branch_in_contact(arch):
     branch = switch(arch, 1, -1)
     (leaves,) = branch.transitions

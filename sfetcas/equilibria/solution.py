@@ -320,7 +320,7 @@ class Configuration:
         scene = self.model.scene
         if not scene.contacts:
             return {}
-        if scene.touches_at_points:
+        if scene.touches_at_points or self.model.mesh.points:
             return closest.answers(self.fields, self.closeness)
         return touches.answers(self.fields)
 

@@ -98,11 +98,22 @@ def follow_path(scene: Scene, settings: Settings | None = None, **changes: Any) 
     """
     if scene.analysis.type != "path":
         raise SceneError(f"found {scene.analysis.type!r}, accepted: 'path' to follow one", ("analysis", "type"))
-    if scene.contacts and not scene.touches_at_points:
-        return follow_in_contact(scene, settings_with(settings, changes))
     settings = settings_with(settings, changes)
+    if scene.contacts and not scene.touches_at_points:
+        return _touching(scene, settings) or follow_in_contact(scene, settings)
     path = PathTracing(scene, settings).path()
     return with_modes(path, settings) if scene.analysis.count_of_modes else path
+
+
+def _touching(scene: Scene, settings: Settings) -> Path | None:
+    """The path of a scene whose members touch obstacles at places only; None where they lie along them."""
+    if any(stop.kind == "sharp" for stop in scene.obstacles.values()):
+        return None
+    tracing = PathTracing(scene, settings, whole=True)
+    try:
+        return tracing.path()
+    except SolveError:
+        return None
 
 
 @single_threaded
@@ -238,11 +249,18 @@ def _states(level: _Level) -> Iterator[tuple[str, Fields]]:
 
 
 class PathTracing:
-    """One path with its branches, on finer and finer meshes."""
+    """One path with its branches, on finer and finer meshes.
 
-    def __init__(self, scene: Scene, settings: Settings) -> None:
+    Parameters
+    ----------
+    scene, settings
+    whole : bool
+        Whether a path that cannot be followed over a change is none.
+    """
+
+    def __init__(self, scene: Scene, settings: Settings, *, whole: bool = False) -> None:
         self.scene, self.settings, self.analysis = scene, settings, scene.analysis
-        self.span = scene.analysis.span
+        self.span, self.whole = scene.analysis.span, whole
         self.accuracy = settings.accuracy or scene.analysis.accuracy
         members = scene.members.items()
         self.fixed = {n for n, m in members if (settings.elements or m.elements) is not None}
@@ -364,6 +382,8 @@ class PathTracing:
         main = _Stretch(choices.follow(first, self.points, MISSING * self.accuracy))
         curve, start = first.curve, first.begins or first.standing
         way = max(abs(point.factor - start.factor) for point in main.traced.points)
+        if self.whole and main.traced.end in ("lost", "margin"):
+            raise SolveError(Status.FAILED, main.traced.message, start.state)
         if main.traced.end == "bent" and way < LEAST_WAY * self._widest:
             assert main.traced.limit is not None
             raise SolveError(main.traced.limit.status, main.traced.limit.detail, start.state)
