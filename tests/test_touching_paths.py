@@ -218,6 +218,36 @@ def test_statics_jumps_where_the_end_slips_off(off_a_log):
         np.testing.assert_allclose(path.steps[number].position("B"), at(table, factor).position("B"), atol=2e-6)
 
 
+def test_what_only_pegs_hold_up():
+    """A rigid bar on a hinge rests on a peg, and what it carries comes down on another one until the first is left."""
+    peg = {"type": "circle", "radius": 0.1, "member_radius": 0.02, "members": "all"}
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "hinge"},
+            "B": {"position": [1, 0]},
+            "C": {"position": [1.8, 0]},
+        },
+        "members": {"r": {"nodes": ["A", "B"], "type": "rigid"}, "f": {"nodes": ["B", "C"], "section": "s"}},
+        "contacts": {"near": peg | {"center": [0.7, -0.12]}, "far": peg | {"center": [1.5, -0.16]}},
+        "loads": {"F": {"type": "force", "node": "C", "value": [0, -1]}},
+    }
+    path = path_of(table, [0, 4], steps=[0.2, 1.0, 3.0], accuracy=1e-6)
+    assert "at factor 0 nothing tells which way the path goes: it starts at factor 0.004" in path.notes
+    assert [change.rsplit(" at ", 1)[0] for change in told(path)] == [
+        "contacts.far touches f",
+        "contacts.near leaves r",
+    ]
+    first, both, last = path.steps
+    # Moments about the hinge, to rounding: the push on the bar is across it.
+    push = np.linalg.norm(first.contacts["near"]["force"])
+    assert 0.7 * push == pytest.approx(0.2 * first.position("C")[0], rel=1e-8)
+    # All that carries is the sum of both pegs and the hinge.
+    forces = [both.contacts[name]["force"] for name in ("near", "far")]
+    np.testing.assert_allclose(sum(forces) + both.reaction("A")[0], [0.0, 1.0, 0.0], atol=1e-8)
+    np.testing.assert_allclose(last.position("C"), at(table, 3.0).position("C"), atol=2e-6)
+
+
 # -- obstacles that nodes carry -------------------------------------------------------------------
 
 
@@ -309,6 +339,33 @@ def test_what_lies_along_a_floor_is_followed_in_the_older_way():
     assert any("bifurcations and branches are not looked for" in note for note in path.notes)
     begin, end = path.steps[0].contacts["c"]["at"]
     assert 0.0 < begin < end == 1.0
+
+
+def test_a_column_between_walls():
+    """Buckled against a wall, it begins to lie along it at four times Euler's load (Domokos, Holmes, Royce 1997)."""
+    gap, wall = 0.01, {"type": "plane", "member_radius": 0.01, "member": "a"}
+    nodes = {
+        "A": {"position": [0, 0], "support": "hinge"},
+        "B": {"position": [1, 0], "support": "slider", "direction": [1, 0]},
+    }
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": nodes,
+        "members": {"a": {"nodes": ["A", "B"], "section": "s", "release": ["rigid", "hinge"]}},
+        "contacts": {
+            "upper": wall | {"point": [0, gap + 0.01], "normal": [0, -1]},
+            "lower": wall | {"point": [0, -gap - 0.01], "normal": [0, 1]},
+        },
+        "loads": {"F": {"type": "force", "node": "B", "value": [-1, 0]}},
+    }
+    path = path_of(table, [0, 60], branches=1, accuracy=1e-6)
+    euler = np.pi**2
+    assert [e.factor for e in path.main.bifurcations] == pytest.approx([euler, 4.0 * euler], rel=1e-7)
+    for branch, name in zip(path.branches[1:], ("upper", "lower"), strict=True):
+        assert [e.changes for e in branch.transitions] == [(f"contacts.{name} touches a at 0.5",)]
+        assert f"a member begins to lie along contacts.{name}" in branch.end
+        # A curvature of 1e-4 is left, a thousandth of that with which it touches; less is of second order in the slope.
+        assert branch.factors[-1] == pytest.approx(4.0 * euler, rel=2e-3)
 
 
 def test_switching_to_a_branch_in_contact(arch):

@@ -24,7 +24,7 @@ from ..description.records import enumerated
 from ..description.scene import Scene
 from ..equilibria.member_contact_steps import undeformed
 from ..equilibria.solution import Equilibrium
-from ..errors import LIMITS, SolveError, Status
+from ..errors import LIMITS, SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
 from ..mechanics.fields import Fields
@@ -193,7 +193,8 @@ class Touching(Conditions[_At]):
                 return found
         try:
             return self._begun(prepared, span, 0.0, ())
-        except SolveError:
+        except (SceneError, SolveError):
+            # Without loads what only contact holds up is nowhere, or free to move.
             factor = beside_zero(span)
             note = f"at factor 0 nothing tells which way the path goes: it starts at factor {factor:g}"
             return self._begun(prepared, span, factor, (note,))
