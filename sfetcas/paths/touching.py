@@ -278,10 +278,11 @@ class Touching(Conditions[_At]):
             return float(gap / scales.length)
         if isinstance(one, _End) and there:
             point = points[there[0]]
-            if not point.slides[one.side]:
+            side = _side(point.members, one)
+            if not point.slides[side]:
                 return self._inward(fields, point, one)
-            if point.members[one.side] == one.member:
-                return self._from_end(fields, point, one.side, one.end)
+            if point.members[side] == one.member:
+                return self._from_end(fields, point, side, one.end)
         return OPEN
 
     def _same_place(self, point: ContactPoint, one: _At) -> bool:
@@ -339,15 +340,12 @@ class Touching(Conditions[_At]):
         """What goes on beyond ends of members that a point has come to, and how the gap grows there."""
         for side, x in enumerate(point.at):
             end = round(x)
-            if point.slides[side] and abs(x - end) * self.closest.lengths[point.members[side]] <= self._close(fields):
+            if point.slides[side] and abs(self._from_end(fields, point, side, end)) <= NEAR:
                 at = tuple(float(end) if i == side else y for i, y in enumerate(point.at))
                 there = replace(point, at=at)
                 for one in self._at_node(there, side):
                     if one.member != point.members[side]:
                         yield replace(one, at=point.at), self._inward(fields, there, one)
-
-    def _close(self, fields: Fields) -> float:
-        return NEAR * fields.model.scales.length
 
     def _at_node(self, point: ContactPoint, side: int) -> Iterator[_End]:
         """The members on which a point at an end of one of its members may slide."""
@@ -378,7 +376,7 @@ class Touching(Conditions[_At]):
         """Slope of the gap from an end of a member to its inside."""
         there = self._on(point, one.side, one.member, one.end)
         assert there is not None
-        slope = self.closest.slopes(fields, there.pair, there.at)[there.members.index(one.member)]
+        slope = self.closest.slopes(fields, there.pair, there.at)[_side(there.members, one)]
         return float(-slope if one.end else slope)
 
     def _held(self, fields: Fields) -> Iterator[tuple[_Driven, float]]:
@@ -433,11 +431,8 @@ class Touching(Conditions[_At]):
 
     def _slides(self, one: _End, points: Sequence[ContactPoint]) -> bool:
         """Whether a place, one of some points, slides on the member of a condition."""
-        return any(
-            point.slides[one.side] and point.members[one.side] == one.member
-            for point in points
-            if self._same_place(point, one)
-        )
+        there = [(point, _side(point.members, one)) for point in points if self._same_place(point, one)]
+        return any(point.slides[side] and point.members[side] == one.member for point, side in there)
 
     def convex(self, which: Sequence[_At]) -> bool:
         """As of :class:`.Conditions`: what stays at an end of a member may be unstable while what slides is not."""
@@ -489,7 +484,6 @@ class Touching(Conditions[_At]):
                 one = (enter or own)[0]
                 there = self._on(point, place, one.member, one.end)
                 assert there is not None
-                # Pairs have an order.
                 after = place if there.members[place] == one.member else 1 - place
                 turned ^= after != place
                 slides = tuple(bool(enter) if i == after else free for i, free in enumerate(there.slides))
@@ -551,6 +545,12 @@ SAME_END = 1e-9
 
 ONE = 0.2
 """Places nearer to each other than this share of what makes minima one are one, as in statics."""
+
+
+def _side(members: tuple[str, ...], one: _End) -> int:
+    """Which of the members of a point is that of a condition, or took its place: pairs have an order."""
+    other = len(members) - 1 - one.side
+    return other if members[one.side] != one.member and members[other] == one.member else one.side
 
 
 def _touch(near: Near) -> _Touch:
