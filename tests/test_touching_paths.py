@@ -424,15 +424,30 @@ def test_a_node_that_is_driven_onto_an_obstacle_ends_the_path():
     assert path.points[-1].factor == pytest.approx(0.25, abs=1e-8)
 
 
+def test_edge_with_a_radius_of_members():
+    """A knife edge under a rod with a radius is a peg with that radius under a thin one."""
+    edge = {"type": "point", "position": [0.6, -0.1], "side": [0, 1], "member_radius": 0.02}
+    peg = {"type": "circle", "center": [0.6, -0.1], "radius": 0.02}
+    rod, thin = (path_of(cantilever(contact), [0, 3], steps=[1.0, 3.0]) for contact in (edge, peg))
+    for a, b in zip(rod.steps, thin.steps, strict=True):
+        np.testing.assert_allclose(a.position("B"), b.position("B"), atol=2e-7)
+    assert rod.transitions[0].factor == pytest.approx(thin.transitions[0].factor, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("contact", "analysis", "sentence"),
     [
         ({"friction": 0.2}, {}, r"contacts\.c: found friction with analysis\.type = 'path', accepted: with 'static'"),
         ({}, {"modes": 2}, "without modes"),
-        ({"type": "point", "position": [0.5, -1], "side": [0, 1]}, {}, "member_radius"),
     ],
 )
 def test_what_paths_with_radii_are_not_for(contact, analysis, sentence):
-    wrong = {key: x for key, x in DRUM.items() if contact.get("type") is None or key == "member_radius"}
     with pytest.raises(SceneError, match=sentence):
-        path_of(cantilever(wrong | contact, sections={"s": {"EI3": 1.0, "rhoA": 1.0}}), [0, 1], **analysis)
+        path_of(cantilever(DRUM | contact, sections={"s": {"EI3": 1.0, "rhoA": 1.0}}), [0, 1], **analysis)
+
+
+def test_edges_beside_what_touches_at_points_are_refused():
+    table = cantilever(DRUM)
+    table["contacts"]["e"] = {"type": "point", "position": [0.4, -0.05], "side": [0, 1], "member": "a"}
+    with pytest.raises(SceneError, match="beside the edge 'e' on a path, accepted: with its 'member_radius'"):
+        path_of(table, [0, 1])

@@ -1053,6 +1053,8 @@ def _check_points(scene: Scene) -> None:
     for edge, stop in scene.obstacles.items():
         if stop.kind == "sharp" and scene.contacts[edge].friction > 0.0:
             raise SceneError("found friction on an edge, accepted: with 'member_radius', or none", ("contacts", edge))
+        if stop.kind == "sharp" and on_path and scene.contacts[edge].member_radius == 0.0:
+            raise SceneError(f"{found} beside the edge {edge!r} on a path, accepted: with its 'member_radius'", where)
     if scene.stopped:
         raise SceneError(f"{found} beside stops or tendons that may be slack, accepted: one of these", where)
 
