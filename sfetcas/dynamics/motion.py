@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.closest import Closest
-from ..contact.pressing import pressed
-from ..contact.touches import Touched
+from ..contact.pressing import pressed, push_at
 from ..description.answers import MOTION
 from ..description.records import counted, plain, say
 from ..description.showing import error_in_words, notes_in_words, number_in_words, shown
@@ -264,10 +263,10 @@ class MotionState(Configuration):
     def pushes(self, contact: str) -> list[tuple[str, float, Array]]:
         """As of :meth:`.Configuration.pushes`, at each place where the obstacle stops a member."""
         spots = [spot for spot in self.model.mesh.spots or () if spot.contact == contact]
-        touched = Touched.of(self.fields)
         nothing = np.zeros(3), False
         return [
-            (spot.member, spot.at, touched.push_at(spot) + self.friction.get(spot.name, nothing)[0]) for spot in spots
+            (spot.member, spot.at, push_at(self.fields, spot) + self.friction.get(spot.name, nothing)[0])
+            for spot in spots
         ]
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:

@@ -338,7 +338,8 @@ class Simulation:
         analysis = self.scene.analysis
         mesh, error = self.mesh, None
         if self.scene.contacts and analysis.initial == "equilibrium":
-            mesh = ending_at(self.scene, mesh, self.before.model.mesh.touches)
+            entries = (entry for name in self.scene.obstacles for entry in self.before.touched(name))
+            mesh = ending_at(self.scene, mesh, ((e["member"], at) for e in entries for at in np.atleast_1d(e["at"])))
         apart: float | None = None
         run = self.run(mesh, 0)
         for rounds in range(1, 1 + ROUNDS if analysis.step is None else 1):

@@ -326,10 +326,14 @@ class Configuration:
 
     def pushes(self, contact: str) -> list[tuple[str, float, Array]]:
         """Where an obstacle pushes: member, fraction of its length, of a stretch its middle, and force (3,), N."""
+        return [(entry["member"], float(np.mean(entry["at"])), entry["force"]) for entry in self.touched(contact)]
+
+    def touched(self, contact: str) -> list[dict[str, Any]]:
+        """What :attr:`contacts` tells of each place or stretch where a state at rest touches."""
         entry = self.contacts[contact]
-        several = isinstance(entry["member"], list)
-        parts = (entry[key] if several else [entry[key]] for key in ("member", "at", "force"))
-        return [(member, float(np.mean(at)), force) for member, at, force in zip(*parts, strict=True) if at is not None]
+        if not isinstance(entry["member"], list):
+            return [] if entry["at"] is None else [entry]
+        return [dict(zip(entry, parts, strict=True)) for parts in zip(*entry.values(), strict=True)]
 
     @functools.cached_property
     def energy(self) -> dict[str, float]:

@@ -8,7 +8,7 @@ neither is more than what is accepted.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..description.scene import Scene
 from ..description.structure import SLIDING
 from ..mathematics.arrays import Array
 from .carried import carried
-from .mesh import Mesh, Spot, Touch, breaks_of
+from .mesh import Mesh, Spot, breaks_of
 from .rotations import end_joints
 from .segments import place_within
 
@@ -86,21 +86,25 @@ def fine_enough(scene: Scene, mesh: Mesh, accuracy: float, fixed: Collection[str
     return replace(mesh, cuts=cuts)
 
 
-def ending_at(scene: Scene, mesh: Mesh, touches: Sequence[Touch]) -> Mesh:
-    """The mesh with ends of elements where members touch obstacles in the equilibrium that a motion begins with."""
+def ending_at(scene: Scene, mesh: Mesh, places: Iterable[tuple[str, float]]) -> Mesh:
+    """The mesh with ends of elements where members touch obstacles in the equilibrium that a motion begins with.
+
+    Parameters
+    ----------
+    places : iterable of (str, float)
+        Members and fractions of their lengths.
+    """
     cuts = dict(mesh.cuts)
-    for touch in touches:
-        breaks = breaks_of(scene, touch.member)
-        for at in touch.places:
-            own = cuts[touch.member]
-            near = int(np.argmin(np.abs(own - at)))
-            if abs(own[near] - at) <= tolerances.DECIMAL:
-                continue
-            movable = 0 < near < len(own) - 1 and np.abs(breaks - own[near]).min() > tolerances.DECIMAL
-            # An end that is near is moved there: slivers gain nothing.
-            if movable and abs(own[near] - at) < WITHIN * np.diff(own)[near - 1 : near + 1].min():
-                own = np.delete(own, near)
-            cuts[touch.member] = np.sort(np.append(own, at))
+    for member, at in places:
+        breaks, own = breaks_of(scene, member), cuts[member]
+        near = int(np.argmin(np.abs(own - at)))
+        if abs(own[near] - at) <= tolerances.DECIMAL:
+            continue
+        movable = 0 < near < len(own) - 1 and np.abs(breaks - own[near]).min() > tolerances.DECIMAL
+        # An end that is near is moved there: slivers gain nothing.
+        if movable and abs(own[near] - at) < WITHIN * np.diff(own)[near - 1 : near + 1].min():
+            own = np.delete(own, near)
+        cuts[member] = np.sort(np.append(own, at))
     return replace(mesh, cuts=cuts)
 
 
