@@ -309,11 +309,11 @@ class Scene(Record):
     def touches_at_points(self) -> bool:
         """Whether it is an unknown where members touch, see :mod:`sfetcas.mechanics.contact_points`.
 
-        In load steps they are, but beside stops; elsewhere where touches as conditions of elements lack what there is.
+        In load steps they are; elsewhere where touches as conditions of elements lack what there is.
         """
         if any(_why_points(self, name) for name in self.contacts):
             return True
-        return bool(self.contacts) and self.analysis.type == "static" and not self.stopped
+        return bool(self.contacts) and self.analysis.type == "static"
 
     @property
     def rubs(self) -> bool:
@@ -1055,8 +1055,12 @@ def _check_points(scene: Scene) -> None:
             raise SceneError("found friction on an edge, accepted: with 'member_radius', or none", ("contacts", edge))
         if stop.kind == "sharp" and on_path and scene.contacts[edge].member_radius == 0.0:
             raise SceneError(f"{found} beside the edge {edge!r} on a path, accepted: with its 'member_radius'", where)
-    if scene.stopped:
+    if scene.stopped and on_path:
         raise SceneError(f"{found} beside stops or tendons that may be slack, accepted: one of these", where)
+    if scene.rubs and scene.stopped:
+        # What is taut and at a stop is found for each step by itself, friction is that of all steps before it.
+        where = ("contacts", next(name for name, contact in scene.contacts.items() if contact.friction > 0.0))
+        raise SceneError("found friction beside stops or tendons that may be slack, accepted: one of these", where)
 
 
 def _why_points(scene: Scene, name: str) -> str:

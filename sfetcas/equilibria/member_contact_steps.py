@@ -109,6 +109,11 @@ class MemberContactSteps:
         # What has no place without loads may be led through other members before they are looked at.
         if (pilot.lacks_slack or pilot.diagnosis.mobility) and self._begun(pilot, factor, zero) is None:
             return None
+        if pilot.model.mesh.stops:
+            # A stop that is held all along is where it is at once.
+            held = pilot.correct(zero.state, zero.loading)
+            if not (held.converged and self.run.unstopped(zero, held)):
+                return None
         try:
             found = self.ways.grown_from_zero(pilot, factor, self.run.unstopped)
         except SolveError as error:
