@@ -106,6 +106,12 @@ CLOSED = 1e-9
 Places in a file have ten digits and more, rounding leaves 1e-15; a gap that is meant is one that can be built.
 """
 
+LOST = 1e-5
+"""What may be missing in the balance of all that acts on the structure of an answer; share of the largest force.
+
+Rounding leaves 1e-12; places of contact that are conditions of elements leave a thousandth of it.
+"""
+
 REACHED = 1e-6
 """Gaps with which a start that was asked for counts as reached, before Newton's method; lengths of the scene, or rad.
 

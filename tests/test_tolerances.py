@@ -148,6 +148,12 @@ def several():
     return told(cantilever((-15.0, 8.0), analysis={"equilibria": "all"}))
 
 
+def resting():
+    """On a floor: what it pushes with is in balance to rounding."""
+    floor = {"type": "plane", "point": [0, -0.05], "normal": [0, 1], "members": "all"}
+    return told(cantilever((0.0, -1.0), contacts={"floor": floor}))
+
+
 CASES = {
     "DECIMAL": (all_but_plane, 1e-3),
     "WRITTEN": (universal_joint_in_ten_digits, 1e-3),
@@ -164,6 +170,7 @@ CASES = {
     "EXACT": (rolled_up, None),
     "BALANCED": (rolled_up, 1e-3),
     "CLOSED": (lambda: told(three_parallel_cranks(1e-11, (1.0, 0.0, 0.0))), 1e-6),
+    "LOST": (resting, None),
     "REACHED": (started_below, None),
     "LEVEL": (column, 1e6),
     "REAL": (damped, 1e6),

@@ -7,14 +7,12 @@ answer is refused.
 
 from __future__ import annotations
 
+from .. import tolerances
 from ..errors import SolveError, Status
 from ..mechanics.fields import Fields
 from .touches import Touched
 
-__all__ = ["SHARE", "refuse_unbalanced"]
-
-SHARE = 1e-5
-"""Smallest forces and moments that count, share of the largest; errors of contact places are a thousandth of this."""
+__all__ = ["refuse_unbalanced"]
 
 
 def refuse_unbalanced(fields: Fields) -> None:
@@ -28,7 +26,7 @@ def refuse_unbalanced(fields: Fields) -> None:
     for touch in fields.model.mesh.touches:
         if touch.to is None:
             continue
-        lost = Touched.of(fields).opened(touch, SHARE)
+        lost = Touched.of(fields).opened(touch, tolerances.LOST)
         if lost is not None:
             where = f"at node {lost.node}" if lost.node else f"at {lost.at:.6g}"
             pulled = lost.pull > lost.couple / fields.model.scales.length

@@ -15,7 +15,6 @@ from ..description.supports import along
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array, unit
 from ..mechanics.accuracy import halving, roughness
-from ..mechanics.balance import three
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import Mesh, Touch
 from ..solvers.continuation import JUMPED, between, near_factor
@@ -25,7 +24,7 @@ from .settling import Held, Way, placed
 from .touches import COARSE, NOISE, Touched, edge_sides
 from .touching import Toucher
 
-__all__ = ["ContactRun", "Pressed", "refuse_held_inside"]
+__all__ = ["ContactRun", "Pressed"]
 
 STAYS = "unstable, and no stable equilibrium was found along its unstable mode"
 """Note of an unstable answer."""
@@ -51,30 +50,6 @@ class Pressed:
     stability: Stability
     error: float
     notes: tuple[str, ...]
-
-
-def refuse_held_inside(scene: Scene, pilot: Prepared, factor: float) -> None:
-    """Refuse a node that a support or a motion fixes inside an obstacle at a factor.
-
-    Raises
-    ------
-    SolveError
-        There is one; the message names it and the obstacle.
-    """
-    model = pilot.model
-    axes = model.element.axes
-    shifts = model.loading(factor).shift.reshape(-1, axes) * model.scales.length
-    for contact, stop in scene.obstacles.items():
-        members = [scene.members[name] for name in members_of(scene.contacts[contact], scene.members)]
-        for node in dict.fromkeys(n for member in members for n in member.nodes):
-            record = scene.nodes[node]
-            if stop.kind == "sharp" or record.support == "free" or record.slides:
-                continue
-            place = three(np.asarray(record.position)[:axes] + shifts[model.segments.place(node)])
-            gap = float(stop.gaps(place[None, :], np.zeros((1, 3)))[0]) - scene.contacts[contact].member_radius
-            if gap < -COARSE * scene.size:
-                detail = f"node {node} is held {-gap:.3g} m inside contacts.{contact}"
-                raise SolveError(Status.INFEASIBLE, detail)
 
 
 class ContactRun:

@@ -7,7 +7,7 @@ Jacobian by differences and Broyden's updates.  The mesh moves with them.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +33,6 @@ __all__ = [
     "Settler",
     "Way",
     "carried_over",
-    "closed",
     "free_places",
     "moved",
     "placed",
@@ -215,26 +214,14 @@ def _carried(source: tuple[Model, State], loading: Loading, model: Model, state:
     return replace(state, y=y)
 
 
-def closed(equations: Equations, state: State, loading: Loading, known: Collection[str]) -> State:
-    """The state with the displacements of new unknowns chosen such that the closings are met best."""
-    n, positions = equations.unknowns, equations.model.positions
-    rows, new = len(positions.rows), [i for i, name in enumerate(positions.unknowns) if name not in known]
-    if not rows or not new or rows * len(new) > 4_000_000:
-        return state
-    gaps = equations.at(state, loading).residual[n : n + rows]
-    y = state.y.copy()
-    y[new] -= np.linalg.lstsq(positions.W.full()[:, new], gaps, rcond=tolerances.RANK)[0]
-    return replace(state, y=y)
-
-
 def carried_over(
     scene: Scene, source: tuple[Model, State], before: Loading, prepared: Prepared, loading: Loading
 ) -> State:
     """A state of one model as the start on another mesh: same positions of nodes, closings met, least residual."""
     state = _carried(source, before, prepared.model, transferred(source[0], source[1], prepared.model))
     known = {*source[0].positions.unknowns, *(f"{node}.{axis}" for node in scene.nodes for axis in "xyz")}
-    state = closed(prepared.equations, prepared.equations.holding(state, loading), loading, known)
-    return balanced(prepared.equations, state, loading)
+    equations = prepared.equations
+    return balanced(equations, equations.closed(equations.holding(state, loading), loading, known), loading)
 
 
 class Settler:

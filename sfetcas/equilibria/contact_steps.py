@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from ..contact.contact_balance import refuse_unbalanced
-from ..contact.contact_statics import ContactRun, Pressed, refuse_held_inside
+from ..contact.contact_statics import ContactRun, Pressed
+from ..contact.held_inside import refuse_held_inside
 from ..contact.settling import Held
 from ..errors import LIMITS, SolveError, Status
 from ..solvers.prepared import Prepared

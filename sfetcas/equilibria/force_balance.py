@@ -11,7 +11,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from .. import tolerances
-from ..contact.contact_balance import SHARE
 from ..description.tendons import Hole, Stretch
 from ..errors import SolveError, Status
 from ..mathematics import quaternion
@@ -42,7 +41,7 @@ def refuse_lost_forces(answer: Equilibrium) -> None:
     # Tendons and natural curvature bend what nothing holds from outside: then all forces are rounding.
     least = tolerances.UNIT * answer.model.scales.force
     size = max([least, *(float(np.abs(force).max()) for force in forces)])
-    if float(np.abs(missing).max()) > SHARE * size:
+    if float(np.abs(missing).max()) > tolerances.LOST * size:
         found = ", ".join(f"{entry:.3g}" for entry in missing)
         detail = f"reactions, contact forces and loads are out of balance by ({found}) N"
         raise SolveError(Status.FAILED, detail, answer.state)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .. import tolerances
-from ..contact.contact_statics import refuse_held_inside
+from ..contact.held_inside import refuse_held_inside
 from ..contact.lines import Points, points_of
 from ..contact.member_contact import MemberContact
 from ..description.inserting import stops_between

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from .. import tolerances
-from ..contact.settling import closed
 from ..description.records import counted
 from ..description.supports import free_to_move
 from ..errors import SceneError, SolveError, Status
@@ -145,7 +144,7 @@ class Refinement:
         if not source.model.scene.tendons or segments.retained <= told:
             return state
         state = prepared.equations.holding(state, loading)
-        return closed(prepared.equations, state, loading, {*source.model.positions.unknowns})
+        return prepared.equations.closed(state, loading, {*source.model.positions.unknowns})
 
     @staticmethod
     def _corrected(prepared: Prepared, state: State, loading: Loading, flat: bool) -> Solved:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-from ..contact.contact_statics import refuse_held_inside
+from ..contact.held_inside import refuse_held_inside
 from ..contact.member_contact import MemberContact
 from ..description.inserting import stops_between
 from ..errors import SolveError, Status

@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array, Index
 from ..mathematics.kernels import Kernels, chosen
@@ -42,6 +43,9 @@ __all__ = [
     "turned_tangents",
     "yielded",
 ]
+
+MOST_CLOSED = 4_000_000
+"""Entries of a matrix of closings up to which displacements are chosen by them."""
 
 UNLOADED = 1e-6
 """Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
@@ -271,6 +275,17 @@ class Equations:
             return replace(state, q=q)
         unwrapped = self.model.unwrapping.prescribed(self.model.rotations.kind, loading)
         return replace(state, q=q, unwrapped=np.where(np.isnan(unwrapped), state.unwrapped, unwrapped))
+
+    def closed(self, state: State, loading: Loading, known: Collection[str]) -> State:
+        """The state with displacements chosen such that the closings are met best; those of ``known`` names stay."""
+        n, positions = self.unknowns, self.model.positions
+        rows, new = len(positions.rows), [i for i, name in enumerate(positions.unknowns) if name not in known]
+        if not rows or not new or rows * len(new) > MOST_CLOSED:
+            return state
+        gaps = self.at(state, loading).residual[n : n + rows]
+        y = state.y.copy()
+        y[new] -= np.linalg.lstsq(positions.W.full()[:, new], gaps, rcond=tolerances.RANK)[0]
+        return replace(state, y=y)
 
     def segment_pulls(self, lam: Array, loading: Loading) -> Array:
         """Minus the constant part of the internal force of each segment, (segments, axes), dimensionless."""
