@@ -28,6 +28,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import ContactPoint, Mesh
 from ..mechanics.model import Model
 from ..mechanics.segments import cuts_of_point, place_of_cut
+from ..solvers.between_states import turned_between
 from ..solvers.continuation import JUMPED, near_factor
 from ..solvers.newton import Limits, correct
 from ..solvers.one_sided import OneSided
@@ -57,6 +58,9 @@ TURN, ITERATIONS = 0.6, 30
 
 STRIDE = 0.5
 """Largest rotation in a step of the way, rad: members between are then near to where they are at its ends."""
+
+SWUNG = 2.0
+"""Rotation between two states from which on members may have swung through others unseen, rad."""
 
 FIRST, SHORTEST, AIM = 0.25, 2.0**-14, 0.7
 """First and shortest step, parts of the way; share of a stride that steps aim at."""
@@ -201,7 +205,14 @@ class MemberContact:
     def unstopped(self, before: Solved, after: Solved) -> bool:
         """Whether members neither penetrate nor pass each other from one state to another."""
         self.edges.begin(before.fields)
-        return self.clear(after.fields) and not self.passed(before.fields, after.fields)
+        near = self._swung(before, after) < SWUNG and self.clear(after.fields)
+        return near and not self.passed(before.fields, after.fields)
+
+    @staticmethod
+    def _swung(before: Solved, after: Solved) -> float:
+        """Largest rotation between two states, rad; in the plane whole turns count, which tangents do not show."""
+        there = transferred(before.model, before.state, after.model)
+        return float(np.abs(turned_between(after.prepared.equations, after.state, there, near=True)).max(initial=0.0))
 
     def lying(self, start: Solved) -> Solved:
         """An undeformed state with the points where members lie on obstacles."""
@@ -682,7 +693,8 @@ class MemberContact:
             crossings = [] if there is None else self._crossings(now.fields, there.fields)
         if there is None or crossings:
             return None
-        far = self.turned(now.fields, there.fields) > self.stride or self._crossings(there.fields, now.fields)
+        far = self.turned(now.fields, there.fields) > self.stride or self._swung(now, there) > SWUNG
+        far = far or self._crossings(there.fields, now.fields)
         return None if far else there
 
     def _fallen_from(self, mesh: Mesh, now: _Step, part: float, way: Way) -> Solved | None:
