@@ -44,6 +44,19 @@ def test_pivots_in_blocks_that_go_round_end():
     assert np.abs(x * rest).max() < 1e-12
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_rows_that_depend_on_each_other_have_a_solution(seed):
+    """More forces than motions, of whole numbers: ties between pivots that rounding must not break."""
+    rng = np.random.default_rng(seed)
+    rows = rng.integers(-2, 3, size=(12, 3)).astype(float)
+    matrix, given = rows @ rows.T, rows @ rng.standard_normal(3)
+    x = by_pivots(matrix, given)
+    rest = given + matrix @ x
+    # Rounding of numbers of the size of ten.
+    assert min(x.min(), rest.min()) > -1e-12
+    assert abs(x @ rest) < 1e-9
+
+
 def test_what_has_no_solution_is_told():
     assert by_pivots(np.array([[-1.0]]), np.array([-1.0])) is None
 

@@ -4,6 +4,7 @@ The independent route is contact as conditions of elements, by another code: wha
 what has none on something that is larger by ``r``.
 """
 
+import math
 import numpy as np
 import pytest
 
@@ -166,3 +167,48 @@ def test_a_rod_that_stretches_rests_in_a_circle_on_its_ends_and_its_middle():
     assert (bowl["at"][0], bowl["at"][-1]) == (0.0, 1.0)
     # All of the weight.
     np.testing.assert_allclose(np.sum(bowl["force"], axis=0), [0.0, 0.4, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("force", [5.0, 30.0])
+def test_an_arch_that_snaps_lands_on_a_drum_on_both_sides(force):
+    """It begins to fall so slowly that it would seem to rest where it was."""
+    nodes = {
+        "L": {"position": [-1, 0], "support": "hinge"},
+        "M": {"position": [0, 0.2]},
+        "R": {"position": [1, 0], "support": "hinge"},
+    }
+    table = {
+        "sections": {"s": {"EI3": 1.0, "EA": 2000.0}},
+        "nodes": nodes,
+        "members": {"l": {"nodes": ["L", "M"], "section": "s"}, "r": {"nodes": ["M", "R"], "section": "s"}},
+        "contacts": {
+            "w": {"type": "circle", "center": [0, -0.6], "radius": 0.45, "member_radius": 0.03, "members": "all"}
+        },
+        "loads": {"F": {"type": "force", "node": "M", "value": [0, -force]}},
+        "analysis": {"accuracy": 1e-6},
+    }
+    step = solve(Scene.from_dict(table)).last
+    assert step.notes[0].startswith("jumped near factor")
+    # Symmetric to the accuracy asked for.
+    assert sum(step.contacts["w"]["at"]) == pytest.approx(1.0, abs=2e-6)
+    up = np.sum(step.contacts["w"]["force"], axis=0)[1] + sum(step.reaction(name)[0][1] for name in "LR")
+    assert up == pytest.approx(force, rel=1e-6)
+
+
+def test_a_bar_that_its_spring_lets_turn_twice_stops_at_a_peg():
+    """Where it would end it is near to where it was: whole turns between show in no direction."""
+    moment, stiffness, reach, radius = 8.876, 0.7236, math.hypot(0.9569, 0.1826), 0.0772
+    table = {
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+        "members": {"b": {"nodes": ["A", "B"], "type": "rigid"}},
+        "springs": {"k": {"type": "rotational", "node": "A", "stiffness": stiffness}},
+        "loads": {"M": {"type": "moment", "node": "B", "value": moment}},
+        "contacts": {"peg": {"type": "circle", "center": [0.9569, 0.1826], "radius": radius, "members": "all"}},
+    }
+    step = solve(Scene.from_dict(table)).last
+    angle = math.atan2(0.1826, 0.9569) - math.asin(radius / reach)
+    assert step.position("B") == pytest.approx([math.cos(angle), math.sin(angle), 0.0], abs=1e-9)
+    lever = math.sqrt(reach**2 - radius**2)
+    assert np.linalg.norm(step.contacts["peg"]["force"]) == pytest.approx(
+        (moment - stiffness * angle) / lever, rel=1e-9
+    )

@@ -108,9 +108,9 @@ elements are divided on the way: else they pass each other there.
 NUDGE = 0.02
 """Rotation, rad, by which an unstable state is moved along its unstable mode."""
 
-FALLS, DRAGS, BEYOND, SLOW = 80, (1.0, 1e-11, 1e6), 4.0, 0.1
+FALLS, DRAGS, BEYOND, SLOW, STILL = 80, (1.0, 1e-11, 1e6), 4.0, 0.1, 1e-5
 """Steps of a fall at most; first, least and largest drag; drag over what makes a step unique; rotation in a step, rad,
-below which it is looked whether it has come to rest.
+below which it is looked whether it has come to rest, and below which it has, though it may be unstable there.
 """
 
 MOST_FALLS = 12
@@ -785,7 +785,10 @@ class MemberContact:
             if turned < SLOW and drag <= first:
                 rest = self.resolved(mesh, points_of(now), now, way)
                 if rest is not None and self._near(now, rest):
-                    return rest if rest.negative == 0 else self._fallen_on(mesh, rest, way)
+                    if rest.negative == 0:
+                        return rest
+                    if turned < STILL:
+                        return self._fallen_on(mesh, rest, way)
                 if drag <= least:
                     return None
             # Less than what makes a step unique would lead back to the unstable state.
