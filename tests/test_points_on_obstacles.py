@@ -5,6 +5,7 @@ what has none on something that is larger by ``r``.
 """
 
 import math
+
 import numpy as np
 import pytest
 
