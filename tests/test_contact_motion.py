@@ -362,6 +362,26 @@ def test_it_begins_in_equilibrium_on_an_obstacle():
     assert min(np.abs(cuts - np.atleast_1d(static["at"])[0])) < 1e-4
 
 
+@pytest.mark.parametrize("stop", [False, True])
+def test_it_begins_where_a_short_stretch_lies_on_the_floor(stop):
+    """Both ends of the stretch are ends of elements; what lifts the tip is a load, or a stop of a spring."""
+    force = {"loads": {"up": {"type": "force", "node": "B", "value": [0, 0.93]}}}
+    spring = {"type": "translational", "node": "B", "stiffness": 0.0, "direction": [0, 1], "stop": [-0.0495, 1]}
+    held = {"springs": {"k": spring}} if stop else force
+    motion = solve(lying(**held))
+    static = solve(lying(**held, analysis={}), accuracy=1e-6).last
+    first, cuts = motion.steps[0], motion.last.model.mesh.cuts["m"]
+    for at in static.contacts["floor"]["at"]:
+        assert min(np.abs(cuts - at)) < 1e-4
+    assert not motion.events
+    np.testing.assert_allclose(
+        first.contacts["floor"]["force"], static.contacts["floor"]["force"], rtol=4e-2, atol=1e-9
+    )
+    assert len(first.contacts["floor"]["touching"]) == 2
+    for step in motion.steps:
+        assert step.position("B")[1] == pytest.approx(first.position("B")[1], abs=1e-4)
+
+
 def test_a_damped_beam_ends_in_the_equilibrium_of_statics():
     table = {"A": {"position": [0, 0.2], "support": "clamped"}, "B": {"position": [1, 0.2]}}
     section = {"EI3": 1.0, "rhoA": 1.0, "damping": 0.5, "drag": 2.0}

@@ -95,12 +95,16 @@ def ending_at(scene: Scene, mesh: Mesh, places: Iterable[tuple[str, float]]) -> 
         Members and fractions of their lengths.
     """
     cuts = dict(mesh.cuts)
+    kept = {member: breaks_of(scene, member) for member in cuts}
     for member, at in places:
-        breaks, own = breaks_of(scene, member), cuts[member]
+        own = cuts[member]
         near = int(np.argmin(np.abs(own - at)))
+        fixed = np.abs(kept[member] - own[near]).min() <= tolerances.DECIMAL
+        # The next place is not to move this one.
+        kept[member] = np.append(kept[member], at)
         if abs(own[near] - at) <= tolerances.DECIMAL:
             continue
-        movable = 0 < near < len(own) - 1 and np.abs(breaks - own[near]).min() > tolerances.DECIMAL
+        movable = 0 < near < len(own) - 1 and not fixed
         # An end that is near is moved there: slivers gain nothing.
         if movable and abs(own[near] - at) < WITHIN * np.diff(own)[near - 1 : near + 1].min():
             own = np.delete(own, near)
