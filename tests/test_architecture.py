@@ -199,7 +199,6 @@ ORDER = [
     "equilibria.ways",
     "equilibria.refinement",
     "equilibria.further",
-    "equilibria.contact_steps",
     "equilibria.member_contact_steps",
     "equilibria.rough_contact_steps",
     "equilibria.memory_steps",

@@ -1007,9 +1007,9 @@ def test_what_sliding_makes_stable_has_no_negative_eigenvalue():
 
 
 def test_node_held_inside_an_obstacle_is_told_before_anything_is_solved(monkeypatch):
-    from sfetcas.equilibria.contact_steps import ContactSteps
+    from sfetcas.equilibria.member_contact_steps import MemberContactSteps
 
-    monkeypatch.setattr(ContactSteps, "_answer", lambda *_: pytest.fail("solved"))
+    monkeypatch.setattr(MemberContactSteps, "_alone", lambda *_: pytest.fail("solved"))
     scene = Scene(
         sections={"s": {"EI3": 1.0}},
         nodes={"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1.5, 0], "support": "clamped"}},

@@ -95,7 +95,7 @@ def test_cushions_say_what_touches():
     table["loads"] = {"w": {"type": "distributed", "member": "m0", "value": [0, -20]}}
     scene = made(table)
     meshes = Meshing(scene, Settings())
-    sides = ContactRun(scene, meshes.prepared, 1e-4, set()).reviser.sides
+    sides = ContactRun(scene, meshes.prepared, 1e-4).reviser.sides
     found = Cushions(scene, meshes.prepared, sides).found(meshes.pilot_mesh, [0.0, 1.0])
     assert found is not None
     (touch,) = found.touches

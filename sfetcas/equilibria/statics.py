@@ -26,7 +26,6 @@ from .solution import Equilibrium, Solution, at_factor, refuse_large
 from .ways import Ways
 
 if TYPE_CHECKING:
-    from .contact_steps import ContactSteps
     from .further import FurtherEquilibria
     from .member_contact_steps import MemberContactSteps
 
@@ -162,14 +161,10 @@ class LoadSteps:
 
         return FurtherEquilibria(self.meshes, self.refinement, pilot.model)
 
-    def _contact(self) -> ContactSteps | MemberContactSteps | None:
+    def _contact(self) -> MemberContactSteps | None:
         """The load steps of a scene with obstacles, or in which members touch each other."""
         if not self.scene.contacts:
             return None
-        if self.scene.touches_at_points:
-            from .member_contact_steps import MemberContactSteps
+        from .member_contact_steps import MemberContactSteps
 
-            return MemberContactSteps(self.meshes, self.ways, self.refinement)
-        from .contact_steps import ContactSteps
-
-        return ContactSteps(self.meshes, self.ways, self.refinement)
+        return MemberContactSteps(self.meshes, self.ways, self.refinement)

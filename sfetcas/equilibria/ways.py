@@ -92,12 +92,9 @@ WAYS = {
     "refound": "IPOPT again on a finer mesh, where Newton's method did not converge",
     "no contact": "the loads grow from zero, or a minimum is found, past no obstacle",
     "in contact": "loads and touches grow from zero, or from those of the step before",
-    "retreat": "obstacles come back from where they do not reach the state without them",
-    "cushions": "obstacles are cushions that become hard",
 }
 """The ways to an equilibrium, in the words of ``Equilibrium.way``; in which order they
-are tried say :meth:`Ways.result`, :meth:`Ways.on_pilot` and, in contact,
-:meth:`~sfetcas.contact.contact_statics.ContactRun.reached`."""
+are tried say :meth:`Ways.result` and :meth:`Ways.on_pilot`."""
 
 
 Allowed = Callable[[Solved, Solved], bool]

@@ -114,7 +114,7 @@ class ContactPath:
         return mesh.refined(marks)
 
     def _level(self, base: Mesh) -> _Level:
-        run = ContactRun(self.scene, self.meshes.prepared, self.meshes.accuracy, self.meshes.fixed)
+        run = ContactRun(self.scene, self.meshes.prepared, self.meshes.accuracy)
         run.reviser.limit = COARSE if self.meshes.prescribed else float(np.clip(run.fine, DEEP, COARSE))
         tracer = Tracer(run, base, self.span, self.knots)
         begun = tracer.begin(self._beside)
