@@ -694,8 +694,7 @@ class MemberContact:
         if there is None or crossings:
             return None
         far = self.turned(now.fields, there.fields) > self.stride or self._swung(now, there) > SWUNG
-        far = far or self._crossings(there.fields, now.fields)
-        return None if far else there
+        return None if far or self._crossings(there.fields, now.fields) else there
 
     def _fallen_from(self, mesh: Mesh, now: _Step, part: float, way: Way) -> Solved | None:
         """Where a state comes to rest a little further on its way, where none is near to it; None where it does not."""
