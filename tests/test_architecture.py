@@ -177,7 +177,6 @@ ORDER = [
     "contact.held_inside",
     "contact.touches",
     "contact.settling",
-    "contact.cushions",
     "contact.passing",
     "contact.rolling",
     "contact.contact_stability",

@@ -39,7 +39,6 @@ class ContactRun:
         self.toucher = Toucher(scene, prepare, COARSE, edge_sides(scene))
         self.settler, self.reviser = self.toucher.settler, self.toucher.reviser
         self.stability = self.toucher.stability
-        self.cushions = self.toucher.cushions
         self.fine = max(tolerances.CLOSED, 0.1 * accuracy)
         self.prepare = prepare
 
@@ -76,7 +75,7 @@ class ContactRun:
     def first_touches(self) -> tuple[Touch, ...]:
         """The touches in the undeformed scene."""
         found: list[Touch] = []
-        for contact, stop in self.cushions.obstacles.items():
+        for contact, stop in self.scene.obstacles.items():
             for member in members_of(self.scene.contacts[contact], self.scene.members):
                 line = self.scene.center_lines[member]
                 x = np.linspace(0.0, 1.0, 257)

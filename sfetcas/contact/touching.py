@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +21,6 @@ from ..mechanics.mesh import Mesh, Touch
 from ..solvers.continuation import NARROW
 from ..solvers.prepared import Prepared
 from .contact_stability import ContactStability, can_switch_branch
-from .cushions import Cushioned, Cushions
 from .passing import Passing
 from .revising import Reviser, Tried
 from .settling import Held, Ran, Settler, Way, placed
@@ -100,8 +99,7 @@ class Toucher:
         self.scene, self.prepare = scene, prepare
         self.settler, self.reviser = Settler(scene, prepare), Reviser(scene, limit, sides)
         self.stability = ContactStability(self.settler)
-        self.cushions = Cushions(scene, prepare, sides)
-        self.passing = Passing(scene, self.cushions.obstacles)
+        self.passing = Passing(scene, scene.obstacles)
         self.switch_branch = scene.analysis.unstable == "leave"
         self.snapped: list[float] = []
 
@@ -317,23 +315,6 @@ class Toucher:
         state = prepared.nudged(held.corrected, loading, NUDGE)
         corrected = replace(held.corrected, state=state, point=prepared.equations.at(state, loading))
         return Held(corrected)
-
-    def read(self, base: Mesh, found: Cushioned, way: Way) -> Held | None:
-        """The state in contact near one of penalty contact; None if it is not found."""
-        for touches in _readings(found.touches):
-            held = self.resolved(base, found.held, touches, way)
-            if held is not None:
-                return held
-        return None
-
-
-def _readings(touches: tuple[Touch, ...]) -> Iterator[tuple[Touch, ...]]:
-    """What touches as it was read from cushions; then without single places on members that lie on the obstacle too."""
-    yield touches
-    lying = {(t.contact, t.member) for t in touches if t.to is not None}
-    fewer = tuple(t for t in touches if t.to is not None or (t.contact, t.member) not in lying)
-    if len(fewer) < len(touches):
-        yield fewer
 
 
 def _alike(a: tuple[Touch, ...], b: tuple[Touch, ...]) -> bool:

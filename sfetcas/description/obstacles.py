@@ -29,7 +29,6 @@ __all__ = [
     "members_of",
     "nearest",
     "obstacle",
-    "rounded",
     "swept",
     "takes_part",
 ]
@@ -99,13 +98,6 @@ class Obstacle:
             return 0.0
         out = (point - self.place) / self.radius
         return float(-(out @ np.cross([0.0, 0.0, 1.0], tangent)) / self.radius)
-
-
-def rounded(stop: Obstacle, radius: float) -> Obstacle:
-    """The obstacle; an edge is replaced by a thin rod of given radius, m, behind it."""
-    if stop.side is None:
-        return stop
-    return Obstacle("round", stop.place - radius * unit(stop.side), stop.across, np.zeros(3), radius)
 
 
 def obstacle(contact: Contact, space: bool) -> Obstacle:

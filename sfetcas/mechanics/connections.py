@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import tolerances
-from ..description.obstacles import Obstacle, rounded, takes_part
+from ..description.obstacles import Obstacle, takes_part
 from ..description.scene import Scene
 from ..description.structure import SLIDING
 from ..description.supports import turned_about
@@ -19,8 +19,6 @@ from .contact_joints import (
     Along,
     AlongRound,
     Bent,
-    CushionedPlane,
-    CushionedRound,
     Facing,
     OnEdge,
     OnPlane,
@@ -42,10 +40,10 @@ from .joints import (
     TurnStop,
     Universal,
 )
-from .mesh import Cushion, Mesh, Spot, Touch
+from .mesh import Mesh, Spot, Touch
 from .parts import Parts
 from .rotations import Pin, RotationFreedom, Rotations, end_joints
-from .segments import Segments, cushioned
+from .segments import Segments
 from .terms import GROUND, Group, One
 
 __all__ = ["anchored", "body_numbers", "connections_in", "connections_of", "freedoms", "touches_in"]
@@ -252,8 +250,6 @@ class _Toucher:
                 yield self._on(touch, stop)
             yield from self._lying(touch, stop, covered)
             covered |= set(ends)
-        for cushion in self.mesh.cushions:
-            yield self._cushioned(cushion)
         for spot in self.mesh.spots or ():
             yield self._stopped(spot)
             if spot.rubs:
@@ -321,27 +317,6 @@ class _Toucher:
         axes, unit = self.element.axes, self.scales.length
         across = stop.across[:axes, :axes].T.ravel()
         return np.concatenate([across, start[:axes] / unit, [(stop.radius - stop.sign * offset) / unit, stop.sign]])
-
-    def _cushioned(self, cushion: Cushion) -> One:
-        """A place that is pushed softly; an edge is rounded for that."""
-        space, unit = self.element.space, self.scales.length
-        stop = rounded(self.scene.obstacles[cushion.contact], cushion.edge)
-        start = self.scene.center_lines[cushion.member].positions(np.array([cushion.at]))[0] - stop.place
-        stiffness = cushion.stiffness * unit / self.scales.force
-        data = self._flat(stop, start, 0.0) if stop.kind == "flat" else self._round(stop, start, 0.0)
-        if cushion.at in (0.0, 1.0):
-            place = self.segments.place(self.segments.ends[cushion.member, int(cushion.at)])
-        else:
-            place = self.segments.place(cushioned(cushion.member, cushion.at))
-        kind = CushionedPlane(space) if stop.kind == "flat" else CushionedRound(space)
-        return One(
-            kind,
-            f"cushion of {cushion.contact}",
-            "",
-            np.append(data, [stiffness, cushion.thickness / unit]),
-            (),
-            (place,),
-        )
 
     def _lying(self, touch: Touch, stop: Obstacle, covered: set[tuple[str, int]]) -> Iterator[One]:
         """Sections along a stretch; ``covered`` collects, by negative numbers, rotations that are done."""

@@ -19,8 +19,6 @@ __all__ = [
     "Along",
     "AlongRound",
     "Bent",
-    "CushionedPlane",
-    "CushionedRound",
     "Facing",
     "OnEdge",
     "OnPlane",
@@ -154,36 +152,6 @@ class Sticking(Facing):
         return [ca.dot(part[:n], ca.vertcat(*u)) - part[n] for part in parts]
 
 
-@final
-@dataclass(frozen=True)
-class CushionedPlane(Term):
-    """Penalty contact of a place with a plane; data: those of :class:`OnPlane`, stiffness, thickness."""
-
-    @property
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """No constraint row."""
-        return 0, 1, 0, self.axes + 3, 0
-
-    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Penalty energy."""
-        return _cushion(_gap_of_plane(u[0], data), data[self.axes + 1 :])
-
-
-@final
-@dataclass(frozen=True)
-class CushionedRound(Term):
-    """Penalty contact of a place with something round; data: those of :class:`OnRound`, stiffness, thickness."""
-
-    @property
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """No constraint row."""
-        return 0, 1, 0, self.axes * self.axes + self.axes + 4, 0
-
-    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Penalty energy."""
-        return _cushion(_gap_of_round(u[0], data), data[self.axes * self.axes + self.axes + 2 :])
-
-
 def directions_along(normal: Array) -> Array:
     """Unit vectors (axes - 1, axes) across a unit normal (axes,) and each other."""
     if len(normal) == 2:
@@ -203,15 +171,6 @@ def _gap_of_round(u: Side, data: ca.SX) -> ca.SX:
     # At the centre itself, where a bar across a bowl may be, the distance still has derivatives.
     distance = ca.sqrt(ca.sumsqr(out) + CENTRE)
     return data[n * n + n + 1] * (distance - data[n * n + n])
-
-
-def _cushion(gap: ca.SX, data: ca.SX) -> ca.SX:
-    """Half the stiffness times the square of the depth, which begins smoothly within the thickness."""
-    stiffness, thickness = data[0], data[1]
-    root = ca.sqrt(gap**2 + thickness**2)
-    # Outside, the difference of two near numbers is written as a quotient.
-    depth = 0.5 * ca.if_else(gap > 0.0, thickness**2 / (root + ca.fmax(gap, 0.0)), root - gap)
-    return 0.5 * stiffness * depth**2
 
 
 @final

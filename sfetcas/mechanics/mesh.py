@@ -25,7 +25,6 @@ __all__ = [
     "YIELDING",
     "Approach",
     "ContactPoint",
-    "Cushion",
     "Grip",
     "Mesh",
     "Remembered",
@@ -319,32 +318,6 @@ class Approach:
         return " and ".join(f"members.{member}" for member in self.members)
 
 
-@dataclass(frozen=True)
-class Cushion:
-    """A penalty contact at a place of a member, used on the way to a state in contact.
-
-    Attributes
-    ----------
-    contact, member : str
-        Names of the obstacle and the member.
-    at : float
-        Fraction of the length; an element ends there.
-    stiffness : float
-        Penalty stiffness, N/m.
-    thickness : float
-        Distance from the obstacle at which the force begins, m.
-    edge : float
-        Radius of the thin rod that replaces an edge, m.
-    """
-
-    contact: str
-    member: str
-    at: float
-    stiffness: float
-    thickness: float
-    edge: float
-
-
 @dataclass(frozen=True, eq=False)
 class Remembered:
     """What a member whose law has memory remembers of the steps before, on one mesh.
@@ -383,8 +356,6 @@ class Mesh:
         Contacts with obstacles; elements end there.
     stops : tuple of (str, str)
         Springs that are held at a stop: name, and ``low`` or ``high``; tendons that are slack: name, and ``slack``.
-    cushions : tuple of Cushion
-        Penalty contacts, in the order of their members and fractions.
     points : tuple of ContactPoint
         Where members touch each other or obstacles, and it is an unknown where.
     places : bool
@@ -404,7 +375,6 @@ class Mesh:
     rigid: frozenset[str] = frozenset()
     touches: tuple[Touch, ...] = ()
     stops: tuple[tuple[str, str], ...] = ()
-    cushions: tuple[Cushion, ...] = ()
     points: tuple[ContactPoint, ...] = ()
     places: bool = False
     spots: tuple[Spot, ...] | None = None

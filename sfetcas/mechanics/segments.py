@@ -29,7 +29,6 @@ __all__ = [
     "Segments",
     "angle_of",
     "beside_line",
-    "cushioned",
     "cut_members",
     "cuts_of_point",
     "elongation_of",
@@ -146,8 +145,7 @@ class Segments:
 
 def _touched(mesh: Mesh, member: str) -> dict[int, str]:
     """Cuts of a member where obstacles push it, with the names of these places; its ends among them."""
-    soft = {mesh.cut_at(member, c.at): cushioned(member, c.at) for c in mesh.cushions if c.member == member}
-    return soft | {mesh.cut_at(member, touch.at): touch.name for touch in mesh.touches if touch.member == member}
+    return {mesh.cut_at(member, touch.at): touch.name for touch in mesh.touches if touch.member == member}
 
 
 def standing(mesh: Mesh, point: ContactPoint, side: int) -> int | None:
@@ -210,11 +208,6 @@ def place_of_cut(mesh: Mesh, ends: Mapping[tuple[str, int], str], member: str, c
 def place_within(member: str, at: float) -> str:
     """Name of the place at a fraction of the length of a member where elements end."""
     return f"{member} at {at:.12g}"
-
-
-def cushioned(member: str, at: float) -> str:
-    """Name of the place of a penalty contact within a member."""
-    return f"{member} cushioned at {at:.17g}"
 
 
 def elongation_of(tendon: str) -> str:

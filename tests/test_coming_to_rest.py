@@ -1,37 +1,11 @@
-"""Cushions: first states in contact, wherever members touch."""
+"""What falls onto obstacles, rolls there and comes to rest."""
 
-import casadi as ca
 import numpy as np
 import pytest
 from scenes import SOFT, made
 from test_contacts import balance, smallest_gap
 
 from sfetcas import SolveError, solve
-from sfetcas.contact.contact_statics import ContactRun
-from sfetcas.contact.cushions import Cushions
-from sfetcas.equilibria.meshing import Meshing
-from sfetcas.equilibria.statics import Settings
-from sfetcas.mechanics.contact_joints import CushionedPlane, CushionedRound
-from sfetcas.mechanics.terms import rotation_gradient
-
-FLAT, ROUND = [0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0]
-
-
-def push(kind, data, u):
-    """Force of a cushion on a place, by its energy."""
-    values = rotation_gradient(kind)(ca.DM(1, 0), ca.DM(u), ca.DM(data), ca.DM(0, 1), ca.DM(0, 1))
-    return -np.array(values[3]).ravel()
-
-
-@pytest.mark.parametrize(("kind", "data", "base"), [(CushionedPlane, FLAT, 0.0), (CushionedRound, ROUND, 1.0)])
-def test_force_of_a_cushion_is_that_of_a_spring_inside_and_fades_outside(kind, data, base):
-    stiffness, thickness = 1e4, 1e-3
-    inside = push(kind(False), [*data, stiffness, thickness], [0.0, base - 0.1])
-    np.testing.assert_allclose(inside, [0, stiffness * 0.1], rtol=1e-3)  # (thickness / depth)^2, and its half
-    # Far outside depth is t^2 / (4 g), its slope t^2 / (4 g^2): the force falls with the third power.
-    for gap in (0.1, 0.2):
-        outside = push(kind(False), [*data, stiffness, thickness], [0.0, base + gap])
-        assert outside[1] == pytest.approx(stiffness * thickness**4 / (16.0 * gap**3), rel=1e-3)
 
 
 def chain(seed, kind):
@@ -85,22 +59,6 @@ def test_heavy_chains_over_a_floor_are_solved(kind, seed):
     np.testing.assert_allclose(balance(step), -loads, atol=1e-5 * np.abs(loads).max())  # places of contact
     for push_here in np.atleast_2d(step.contacts["floor"]["force"]):
         assert push_here[1] >= 0.0
-
-
-def test_cushions_say_what_touches():
-    """A strip flat on the floor over a stretch: read within the spacing of the cushions."""
-    table = chain(0, "forces") | {"loads": {}}
-    table["nodes"] = {"n0": {"position": [0, 0.1], "support": "clamped"}, "n1": {"position": [2, 0.1]}}
-    table["members"] = {"m0": {"nodes": ["n0", "n1"], "section": "s"}}
-    table["loads"] = {"w": {"type": "distributed", "member": "m0", "value": [0, -20]}}
-    scene = made(table)
-    meshes = Meshing(scene, Settings())
-    sides = ContactRun(scene, meshes.prepared, 1e-4).reviser.sides
-    found = Cushions(scene, meshes.prepared, sides).found(meshes.pilot_mesh, [0.0, 1.0])
-    assert found is not None
-    (touch,) = found.touches
-    begin, end = solve(scene).last.contacts["floor"]["at"]
-    assert (touch.at, touch.to) == (pytest.approx(begin, abs=1.5 / 48), end)
 
 
 def ring_on_floor(force, nodes):
@@ -178,8 +136,8 @@ def test_node_that_is_held_inside_an_obstacle_is_named():
         solve(made(table))
 
 
-def test_stretch_that_cushions_show_in_two_pieces_is_one():
-    """A chain that falls onto a slope lies on it to its hinge; between two pushes its cushions seem to be free."""
+def test_chain_that_falls_onto_a_slope_lies_on_it_in_one_stretch():
+    """A chain that falls onto a slope lies on it to its hinge."""
     nodes = {"n0": [0, 0], "n1": [0.88, 0.177], "n2": [1.685, 0.087], "n3": [2.224, -0.175]}
     table = {
         "gravity": [0, -9.81],
@@ -199,7 +157,7 @@ def test_stretch_that_cushions_show_in_two_pieces_is_one():
 
 @pytest.mark.parametrize("height", [0.02, 0.05, 0.1])
 def test_a_link_that_falls_a_little_does_not_turn_over(height):
-    """Hinged to a short way above the floor it comes to lie beyond the hinge; on soft cushions it turns over easily."""
+    """Hinged to a short way above the floor it comes to lie beyond the hinge."""
     table = {
         "sections": {"s": {"EI3": 1.0, "rhoA": 2.0}},
         "nodes": {
