@@ -215,9 +215,6 @@ def test_what_is_not_solved_is_refused():
         scene.replace({"tendons.t": {"way": [{"member": "m", "offset": 0.1}], "tension": 1.0}})
     with pytest.raises(SceneError, match="found a section with a law of stretch of a rigid member"):
         scene.replace({"members.m.type": "rigid"})
-    floor = {"type": "plane", "point": [0, -1], "normal": [0, 1], "member": "m"}
-    with pytest.raises(SceneError, match="found an obstacle of 'm', which has a law or stretches with"):
-        scene.replace({"contacts.floor": floor, "analysis": {"type": "path", "range": [0, 1]}})
 
 
 def test_a_table_that_is_too_steep_is_refused():
