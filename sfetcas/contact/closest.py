@@ -376,10 +376,9 @@ class Closest:
         level = abs(float(slope[0])) * self.scene.size < self.lying
         return level and self.lies(fields, pair, min(begin, end), max(begin, end))
 
-    def bends(self, fields: Fields, pair: PairKey, at: float) -> tuple[float, float]:
-        """Slope, and curvature in 1/m, of the gap between a place of a member and an obstacle by arc length."""
-        _, _, slope, curvature = self._gaps(fields, self.pairs[pair], np.array([at]))
-        return float(slope[0]), float(curvature[0])
+    def bends(self, fields: Fields, pair: PairKey, at: float) -> float:
+        """Curvature, 1/m, of the gap between a place of a member and an obstacle by arc length."""
+        return float(self._gaps(fields, self.pairs[pair], np.array([at]))[3][0])
 
     def _gaps(self, fields: Fields, pair: Pair, x: Array) -> tuple[Array, Array, Array, Array]:
         """Of places (n,) of the member gaps (n,), m, normals (n, 3), and slopes (n,) and curvatures (n,), 1/m, of the

@@ -379,7 +379,7 @@ class Lines:
         before, beyond = float(cuts[cut - 1]) - at, float(cuts[cut + 1]) - at
         ahead = AHEAD * ROOM * (beyond if way > 0 else -before)
         places = ASIDE + ahead * np.array([0.0, 0.5, 1.0])
-        _, grows, bends = np.polyfit(places, [self.closest.bends(fields, key, at + way * x)[1] for x in places], 2)
+        _, grows, bends = np.polyfit(places, [self.closest.bends(fields, key, at + way * x) for x in places], 2)
         if way == 0:
             # Half of the way: where the force goes what is nearest goes on.
             nearest = [near.at[0] for near in self.closest.found(fields, LEAST * unit, [self.closest.pairs[key]])]

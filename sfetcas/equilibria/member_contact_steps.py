@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import tolerances
 from ..contact.held_inside import refuse_held_inside
-from ..contact.lines import Points, points_of
+from ..contact.lines import points_of
 from ..contact.member_contact import MemberContact
 from ..description.inserting import stops_between
 from ..description.scene import Scene
@@ -166,10 +166,10 @@ class MemberContactSteps:
         smooth, error, lined, run = np.sqrt(accuracy), np.inf, 0, self.run
         for _ in range(LEVELS):
             if now.model.mesh.elements > lined:
-                pointed, lined = self.run.as_points(now, lambda model: model.loading(factor)), now.model.mesh.elements
+                pointed, lined = run.as_points(now, lambda model: model.loading(factor)), now.model.mesh.elements
                 now = pointed or now
             rough, model = roughness(now.fields) > smooth, now.model
-            ends = self.run.lines.rough_ends(now, accuracy)
+            ends = run.lines.rough_ends(now, accuracy)
             fine = {n: long & (n not in self.meshes.fixed) for n, long in run.lines.long(now).items()}
             marks = {n: (rough[model.elements_of(n)] | ends[n]) & fine[n] for n in model.members}
             if any(marked.any() for marked in marks.values()):
@@ -188,7 +188,7 @@ class MemberContactSteps:
                 break
             now = finer
             # What members penetrate each other by is an error of positions too.
-            error = max(error, self.run.penetration(now.fields) / self.scene.size)
+            error = max(error, run.penetration(now.fields) / self.scene.size)
             if error <= accuracy:
                 now = self._with_ends(now, factor)
                 break
@@ -222,8 +222,8 @@ class MemberContactSteps:
         least = self.meshes.accuracy, FELT * self.meshes.accuracy
         return self.run.with_ends(now, lambda model: model.loading(factor), least) or now
 
-    def _onto(self, mesh: Mesh, found: Solved, factor: float, points: Points | None = None) -> Solved:
-        """The same state on another mesh, with known points or those of the state.
+    def _onto(self, mesh: Mesh, found: Solved, factor: float) -> Solved:
+        """The same state on another mesh.
 
         Raises
         ------
@@ -231,8 +231,7 @@ class MemberContactSteps:
             It is not found there.
         """
         mesh, run = replace(mesh, points=()), self.run
-        points = run.lines.points_on(mesh, found) if points is None else points
-        there = run.resolved(mesh, points, found, lambda model: model.loading(factor))
+        there = run.resolved(mesh, run.lines.points_on(mesh, found), found, lambda model: model.loading(factor))
         if there is None or run.turned(found.fields, there.fields) > NEAR:
             there = run.relaxed(mesh, found, lambda model: model.loading(factor))
             if there is not None and run.turned(found.fields, there.fields) > NEAR:

@@ -399,7 +399,7 @@ class Touching(Conditions[_At]):
         if not len(free):
             return OPEN
         if len(one.members) == 1:
-            return self.closest.bends(fields, one.pair, float(at[0]))[1] * fields.model.scales.length
+            return self.closest.bends(fields, one.pair, float(at[0])) * fields.model.scales.length
         (first, second), (x, y) = one.members, at.tolist()
         curvature = self.closest.half_square(fields, (first, second), (x, y))[1]
         return float(np.linalg.eigvalsh(curvature[np.ix_(free, free)])[0])
