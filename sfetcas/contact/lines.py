@@ -58,11 +58,18 @@ SLIVER = 0.25
 SHARES = 0.2, 3.0
 """Of how far an end is moved what is missing falls by, between which that is taken for the rest as well."""
 
+AT_END, PARTED = 0.02, 1e-2
+"""Share of two elements up to which a place is where they meet; length, over the unit of length, of lines on the way up
+to which a point is parted into their ends.
+"""
+
 SLENDEREST = 0.05
 """Length of an element beside the end of a line at least, over the shorter one before."""
 
-FEWEST = 2
-"""Ends of elements on a line up to which it may be a point."""
+FEWEST, SPREAD = 2, 1e-2
+"""Ends of elements on a line up to which it may be a point, and share of what presses along it up to which its ends may
+stand for it: a twelfth of that, and of its length, is what they move by.
+"""
 
 
 class Lines:
@@ -215,25 +222,36 @@ class Lines:
             mesh = mesh.refined(marks | {first: long})
         return mesh
 
-    def shortened(self, found: Solved, most: int = FEWEST) -> tuple[frozenset[PairKey], list[Near]]:
-        """Lines on obstacles of at most so many ends of elements, and where between them their force is."""
-        fields = found.fields
-        short = {
-            key: stretches
-            for key, stretches in self.stretches(found).items()
-            if self.chosen(key) and all(len(stretch) <= most for stretch in stretches)
-        }
+    def shortened(self, found: Solved, tolerance: float) -> tuple[frozenset[PairKey], list[Near]]:
+        """Lines on obstacles for which points may stand, and where these are.
+
+        Where the force is, of lines of one element; both ends of those on which so little is spread that it neither
+        bends the member between them by more than ``tolerance``, m, nor moves them.
+        """
+        fields, scales, near = found.fields, found.model.scales, list[Near]()
         told = [(point, fields.contact_point(point)["push"]) for point in found.model.mesh.points]
-        near: list[Near] = []
-        for key, stretches in short.items():
+        short = set[PairKey]()
+        for key, stretches in self.stretches(found).items():
+            own = [(point, max(push, 0.0)) for point, push in told if point.pair == key]
+            pressed = sum(push for point, push in own if point.line)
+            # As a beam that is clamped at both ends.
+            softness = self.closest.lengths[key[1][0]] ** 3 / (384.0 * scales.force * scales.length**2)
+            sag = max(pressed * (s[-1] - s[0]) ** 3 / fields.stiffness(key[1][0], s[0]) for s in stretches) * softness
+            little = sag < tolerance and pressed < SPREAD * sum(push for _, push in own)
+            if not self.chosen(key) or not (little or all(len(stretch) <= FEWEST for stretch in stretches)):
+                continue
+            short.add(key)
+            places = list[float]()
             for stretch in stretches:
-                own = [(p.at[0], max(push, 0.0)) for p, push in told if p.pair == key and p.at[0] in stretch]
-                places, pushes = np.array(own).T
+                if len(stretch) > FEWEST:
+                    places += [stretch[0], stretch[-1]]
+                    continue
+                at, pushes = np.array([(p.at[0], push) for p, push in own if p.at[0] in stretch]).T
                 if pushes.any():
-                    at = float(places @ pushes / pushes.sum())
+                    middle = float(at @ pushes / pushes.sum())
                     # What lies beside an end of its member may slide there only from where it may go both ways.
-                    at = at if 0.0 < at < 1.0 else 0.5 * (stretch[0] + stretch[-1])
-                    near += self.closest.beside(fields, self.closest.pairs[key], np.array([at]), np.inf)
+                    places.append(middle if 0.0 < middle < 1.0 else 0.5 * (stretch[0] + stretch[-1]))
+            near += self.closest.beside(fields, self.closest.pairs[key], np.array(places), np.inf)
         return frozenset(short), near
 
     # -- ends -------------------------------------------------------------------------------------
@@ -359,6 +377,77 @@ class Lines:
         )
         return replace(mesh, cuts=cuts, points=()), points
 
+    def parted(
+        self, found: Solved, deep: float, turned: float, known: Collection[PairKey] = ()
+    ) -> tuple[Mesh, Points, PairKey] | None:
+        """Mesh and points with the two ends of a short line in place of one point, and what touches there.
+
+        From such a point a member bends into its obstacle, by more than ``deep``, m, or so that all beyond is turned by
+        more than ``turned``, rad.  None where there is none, but of ``known`` ones; at first the mesh with elements
+        that end there.
+        """
+        points = points_of(found)
+        for i, point in enumerate(points):
+            if point.pair in self.keys or point.pair in known or not self._turns_in(found, point, points):
+                continue
+            (member,), (at,), mesh = point.members, point.at, found.model.mesh
+            cuts = mesh.cuts[member]
+            cut = int(np.argmin(np.abs(cuts - at)))
+            if not 0 < cut < len(cuts) - 1 or abs(cuts[cut] - at) > AT_END * (cuts[cut + 1] - cuts[cut - 1]):
+                near = self.closest.found(found.fields, -deep, [self.closest.pairs[point.pair]])
+                if any(abs(one.at[0] - at) < np.diff(cuts).max() for one in near):
+                    return replace(self.fitted(mesh, (point,)), points=()), points, ("", ())
+                continue
+            low, high, depth, angle = self._ends_of(found, point, cut)
+            short = (high - low) * self.closest.lengths[member] < PARTED * found.model.scales.length
+            turns = angle > turned or (short and depth > deep)
+            inside = cuts[cut - 1] < low < at < high < cuts[cut + 1]
+            if not (turns and inside) or self.closest.alike(point.pair, (low,), (high,)):
+                continue
+            moves = np.abs(breaks_of(self.scene, member) - cuts[cut]).min() > SAME_CUT
+            ends = np.sort([*(np.delete(cuts, cut) if moves else cuts), low, high])
+            # They stay until their force is known, as what begins to touch does.
+            stays = replace(point, slides=(False,), normal=self.closest.pairs[point.pair].normal)
+            both = replace(stays, at=(low,)), replace(stays, at=(high,))
+            mesh = replace(mesh, cuts={**mesh.cuts, member: ends}, points=())
+            return mesh, (*points[:i], *both, *points[i + 1 :]), point.pair
+        return None
+
+    def _ends_of(self, found: Solved, point: ContactPoint, cut: int) -> tuple[float, float, float, float]:
+        """Ends of the line that a point at an end of elements stands for, where the curvature of the gap would be zero;
+        how deep the member is in beside the point, m, and what the line turns it by, rad.
+        """
+        (member,), (at,) = point.members, point.at
+        cuts, length = found.model.mesh.cuts[member], self.closest.lengths[member]
+        ends, depth, angle = [at, at], 0.0, 0.0
+        for side, way in enumerate((-1, 1)):
+            grows, bends = self._curves(found.fields, point.pair, at, way, abs(float(cuts[cut + way]) - at))
+            if bends < 0.0 < grows:
+                apart = -bends / grows
+                ends[side] += way * apart
+                # The gap is g = bends s^2 / 2 + grows s^3 / 6.
+                depth = max(depth, -2.0 / 3.0 * bends * (apart * length) ** 2)
+                angle -= 0.5 * bends * apart * length
+        return ends[0], ends[1], depth, angle
+
+    def _turns_in(self, found: Solved, point: ContactPoint, points: Points) -> bool:
+        """Whether a member bends into its obstacle where it slides on it, and that is no end of a short line."""
+        if point.slides != (True,) or point.edge or not self.bends(point.members[0]) or point.members[0] in self.fixed:
+            return False
+        (at,), fields = point.at, found.fields
+        others = (p.at[0] for p in points if p.pair == point.pair and p.at != point.at)
+        turns = 0.0 < at < 1.0 and self.closest.bends(fields, point.pair, at) < 0.0
+        return turns and not any(self.closest.lies(fields, point.pair, at, x) for x in others)
+
+    def _curves(self, fields: Fields, key: PairKey, at: float, way: int, room: float) -> tuple[float, float]:
+        """How the curvature of the gap grows away from a place on one side, 1/m, and what it is there, 1/m.
+
+        It is seen over a share of the ``room`` there, a fraction of the length.
+        """
+        places = ASIDE + AHEAD * ROOM * room * np.array([0.0, 0.5, 1.0])
+        _, grows, bends = np.polyfit(places, [self.closest.bends(fields, key, at + way * x) for x in places], 2)
+        return float(grows), float(bends)
+
     def _end(
         self,
         found: Solved,
@@ -377,16 +466,14 @@ class Lines:
         cuts, length = found.model.mesh.cuts[member], self.closest.lengths[member] / unit
         cut = found.model.mesh.cut_at(member, at)
         before, beyond = float(cuts[cut - 1]) - at, float(cuts[cut + 1]) - at
-        ahead = AHEAD * ROOM * (beyond if way > 0 else -before)
-        places = ASIDE + ahead * np.array([0.0, 0.5, 1.0])
-        _, grows, bends = np.polyfit(places, [self.closest.bends(fields, key, at + way * x) for x in places], 2)
+        grows, bends = self._curves(fields, key, at, way, beyond if way > 0 else -before)
         if way == 0:
             # Half of the way: where the force goes what is nearest goes on.
             nearest = [near.at[0] for near in self.closest.found(fields, LEAST * unit, [self.closest.pairs[key]])]
             apart = 0.5 * min((x - at for x in nearest), key=abs, default=0.0)
         else:
             # Where it does not grow the end is far away: back where the member bends away, else onwards.
-            apart = -way * float(bends / grows) if grows > 0.0 else -way * float(np.sign(bends))
+            apart = -way * bends / grows if grows > 0.0 else -way * float(np.sign(bends))
         missing, (former, moved) = apart, known.get((member, cut), (0.0, 0.0))
         # Where it ends moves on as elements are moved: by secants.
         if moved and SHARES[0] < (former - missing) / moved < SHARES[1]:

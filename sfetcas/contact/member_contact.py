@@ -34,10 +34,10 @@ from ..solvers.newton import Limits, correct
 from ..solvers.one_sided import OneSided
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
-from .closest import Closest, Near
+from .closest import Closest, Near, PairKey
 from .edges import Edges
 from .gripping import FIRM, Gripping, Placed
-from .lines import FEWEST, LINE, SHORT_LINE, Lines, Points, begun, points_of
+from .lines import LINE, SHORT_LINE, Lines, Points, begun, points_of
 
 __all__ = ["MemberContact"]
 
@@ -442,7 +442,7 @@ class MemberContact:
         tried: set[object] = set()
         since, solved, several, least = source, False, False, LINE
         self.edges.begin(source.fields)
-        careful, alone = False, set[object]()
+        careful, alone, ends = False, set[object](), set[PairKey]()
         for _ in range(ROUNDS):
             found = self.solved(mesh, points, source, way, since if drag else None, drag)
             if found is None:
@@ -455,6 +455,10 @@ class MemberContact:
                 else:
                     return None
             lined = None if careful else self.lines.lengthened(found, least)
+            parted = None if careful or lined else self.lines.parted(found, self.tolerance, np.inf, ends)
+            if parted is not None:
+                lined = parted[:2]
+                ends |= {parted[2]}
             if lined is not None:
                 (mesh, points), several = lined, False
             else:
@@ -736,7 +740,7 @@ class MemberContact:
         before: dict[tuple[str, int], tuple[float, float]] = {}
         for _ in range(ENDS):
             # What touches at single places slides there.
-            found = self.as_points(found, way, 1) or found
+            found = self.as_points(found, way) or found
             moved = self.lines.with_moved_ends(found, least, before)
             if moved is None:
                 break
@@ -746,9 +750,9 @@ class MemberContact:
             found = there
         return found
 
-    def as_points(self, found: Solved, way: Way, most: int = FEWEST) -> Solved | None:
-        """The state with lines on obstacles of at most so many ends of elements as points; None where they are none."""
-        short, near = self.lines.shortened(found, most)
+    def as_points(self, found: Solved, way: Way) -> Solved | None:
+        """The state with points for lines on obstacles where these are as good; None where they are not."""
+        short, near = self.lines.shortened(found, self.tolerance)
         if not short:
             return None
         lines, self.lines.keys = self.lines.keys, self.lines.keys - short
@@ -760,6 +764,15 @@ class MemberContact:
             self.lines.keys = lines
             return None
         return there
+
+    def as_lines(self, found: Solved, way: Way, turned: float) -> Solved | None:
+        """The state with the two ends of each short line that one point stood for; None where there is none.
+
+        ``turned`` as of :meth:`.Lines.parted`.
+        """
+        parted = self.lines.parted(found, self.tolerance, turned)
+        there = None if parted is None else self.resolved(*parted[:2], found, way)
+        return None if there is None or self.turned(found.fields, there.fields) > STRIDE else there
 
     def fallen(self, mesh: Mesh, found: Solved, way: Way) -> Solved | None:
         """Where an unstable state falls to through something viscous; None where it does not come to rest."""

@@ -50,6 +50,9 @@ yet touch.
 FELT = 1e-5
 """Rotation, over the accuracy, that the end of a line makes by being elsewhere, below which it stays."""
 
+POINTED = 0.1
+"""Rotation, over the accuracy, up to which a short line is taken for a point."""
+
 LEFT = "left an equilibrium that is unstable on the fine mesh only"
 """A note."""
 
@@ -178,6 +181,8 @@ class MemberContactSteps:
                 now = self._onto(model.mesh.refined(marks, now.fields.kinks), now, factor)
                 continue
             now = self._fitted(self._with_ends(now, factor), factor)
+            if not self.meshes.prescribed:
+                now = run.as_lines(now, lambda model: model.loading(factor), POINTED * accuracy) or now
             marks = run.lines.long(now)
             if self.meshes.prescribed:
                 marks = {name: np.ones(len(long), bool) for name, long in marks.items()}
