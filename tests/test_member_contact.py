@@ -368,5 +368,5 @@ def test_places_along_a_line_that_are_in_by_rounding_are_not_changed(monkeypatch
     more = {"sections": sections, "loads": loads, "analysis": {"accuracy": 1e-4}}
     step = solve(scene_of(nodes, members, radius=0.0062, **more)).last
     assert wrong_contacts(step) == []
-    # Some thirty equilibria on the way and on three meshes; some fifty where each rounding is looked at.
-    assert len(solves) < 40
+    # Some forty equilibria on the way and on three meshes; some fifty-five where each rounding is looked at.
+    assert len(solves) < 45

@@ -363,18 +363,22 @@ class Closest:
                 break
         return at
 
-    def lies(self, fields: Fields, pair: PairKey, begin: float, end: float) -> bool:
-        """Whether a member lies on an obstacle between two fractions of its length."""
+    def lies(self, fields: Fields, pair: PairKey, begin: float, end: float, lifted: float = 0.0) -> bool:
+        """Whether a member lies on an obstacle between two fractions of its length, or is lifted by so little, m."""
         if self.pairs[pair].stop is None or self.pairs[pair].edge:
             return False
         x = np.linspace(begin, end, SAMPLES + 2)[1:-1]
-        return bool(np.abs(self._gaps(fields, self.pairs[pair], x)[0]).max() < self.lying)
+        return bool(np.abs(self._gaps(fields, self.pairs[pair], x)[0]).max() < max(self.lying, lifted))
 
     def lies_up_to(self, fields: Fields, pair: PairKey, begin: float, end: float) -> bool:
         """Whether a member lies on an obstacle from a place where it touches up to an end of it: it does not turn."""
         slope = self._gaps(fields, self.pairs[pair], np.array([end]))[2]
         level = abs(float(slope[0])) * self.scene.size < self.lying
         return level and self.lies(fields, pair, min(begin, end), max(begin, end))
+
+    def gap_at(self, fields: Fields, pair: PairKey, at: float) -> float:
+        """Gap, m, between a place of a member and an obstacle."""
+        return float(self._gaps(fields, self.pairs[pair], np.array([at]))[0][0])
 
     def bends(self, fields: Fields, pair: PairKey, at: float) -> float:
         """Curvature, 1/m, of the gap between a place of a member and an obstacle by arc length."""

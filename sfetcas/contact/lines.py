@@ -1,11 +1,12 @@
 """Lines: members that lie along an obstacle, or along each other, and the places that stand for that on a mesh.
 
 On an obstacle without friction each element has two forces that are spread along it, one that rises from its start and
-one that falls towards its end, and each end of elements has one that presses at a point, see
+one that falls towards its end, and each end of elements one that presses at a point, see
 :mod:`~sfetcas.mechanics.contact_lines`.  Which of them push is solved for, see :mod:`~sfetcas.solvers.one_sided`; so
-they make any pressure that is linear along elements, and the forces with which a line presses where it ends.  Elements
-are made to end there.  With friction both forces beside an end of elements are one; between members places at ends of
-elements stand for the line, and elements are halved where it ends.
+they make any pressure that is linear along elements, and the forces with which a line presses where it ends.  Then at
+each end one force that slides takes the place of what presses on the last element: where a line ends is an unknown.
+With friction both forces beside an end of elements are one; between members places at ends of elements stand for the
+line, and elements are halved where it ends.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from ..mechanics.segments import SAME_CUT, standing
 from ..solvers.prepared import Solved
 from .closest import Closest, Near, Pair, PairKey
 
-__all__ = ["FEWEST", "LINE", "SHORT_LINE", "Lines", "Points", "begun", "points_in", "points_of"]
+__all__ = ["LINE", "SHORT_LINE", "Lines", "Points", "begun", "points_in", "points_of"]
 
 Points = tuple[ContactPoint, ...]
 
@@ -38,16 +39,16 @@ BESIDE, LOCATED = 2, 8.0
 than so many times the accuracy: an eighth of it is the rotation by a force that is off by half an element.
 """
 
+LIFTED = 3e-6
+"""Gap, over the size, from which on a line does not reach the end of a member, or is interrupted: on coarse elements
+pressure may vanish somewhere within.
+"""
+
 MORE = 3
 """Ends of elements beside a line that may become part of it at once."""
 
-LEAST = 1e-2
-"""Gap, over the unit of length, up to which it is looked where it is least."""
-
-ASIDE, AHEAD, ROOM = 4e-6, 0.3, 0.7
-"""How far beside the end of a line it is seen how the member bends away, fraction of its length, and share of the room
-that elements have to be moved after which it is seen again; share of an element that is room.
-"""
+ASIDE, AHEAD = 4e-6, 0.2
+"""How far beside a point it is seen how the member bends away: a fraction of its length, and a share of the element."""
 
 NEXT = 2e-4
 """Length of an element, over the unit of length, of which no halves are made: what it yields goes with its cube."""
@@ -55,20 +56,9 @@ NEXT = 2e-4
 SLIVER = 0.25
 """Share of an element up to which its end is moved to a place, rather than that another one is made there."""
 
-SHARES = 0.2, 3.0
-"""Of how far an end is moved what is missing falls by, between which that is taken for the rest as well."""
-
-AT_END, PARTED = 0.02, 1e-2
+AT_END, PARTED, FEW = 0.02, 1e-2, 3
 """Share of two elements up to which a place is where they meet; length, over the unit of length, of lines on the way up
-to which a point is parted into their ends.
-"""
-
-SLENDEREST = 0.05
-"""Length of an element beside the end of a line at least, over the shorter one before."""
-
-FEWEST, SPREAD = 2, 1e-2
-"""Ends of elements on a line up to which it may be a point, and share of what presses along it up to which its ends may
-stand for it: a twelfth of that, and of its length, is what they move by.
+to which a point is parted into their ends; ends of elements on so short a line up to which it is seen as a point.
 """
 
 
@@ -106,8 +96,10 @@ class Lines:
         return self.closest.pairs[key].stop is not None and not self.scene.rubs
 
     def has(self, one: ContactPoint | Near) -> bool:
-        """Whether a place is one of those along a line: not where the second member ends, which slides on the first."""
-        return one.pair in self.keys and beside_ends(one)
+        """Whether a place is one of those along a line: not where the second member ends, which slides on the first,
+        nor where a line ends.
+        """
+        return one.pair in self.keys and beside_ends(one) and not slides(one)
 
     def set_out(self, mesh: Mesh, points: Sequence[ContactPoint]) -> list[ContactPoint]:
         """Points with their numbers on a mesh, and whether they stand for what is spread along a line."""
@@ -143,15 +135,73 @@ class Lines:
             if pair.stop is None:
                 continue
             cuts, own = mesh.cuts[pair.members[0]], [p.at[0] for p in points if p.pair == key]
+            ends = self._ending(mesh, points, key)
             near = {one.at[0]: one for one in self.closest.along(fields, pair, mesh, np.inf)}
             on = np.isin(cuts, own) | np.array([near[x].gap < 0.0 for x in cuts.tolist()])
+            beyond = np.clip(np.searchsorted(cuts, ends), 1, len(cuts) - 1)
+            on[beyond] = on[beyond - 1] = True
             apart = np.abs(np.arange(len(cuts))[:, None] - np.flatnonzero(on))
             laid = self.laid(near[x] for x in cuts[apart.min(axis=1, initial=len(cuts)) <= MORE].tolist())
             # Within a line nothing presses at a point.
             inner = {x for x in own if all((key, (x,), sides) in known for sides in ((True, False), (False, True)))}
-            laid = [p for p in laid if not (all(p.sides) and p.at[0] in inner)]
+            laid = [p for p in self.allowed(mesh, points, laid) if not (all(p.sides) and p.at[0] in inner)]
             found += [p for p in laid if (p.pair, p.at, p.sides) not in known]
         return found
+
+    @staticmethod
+    def _ending(mesh: Mesh, points: Iterable[ContactPoint], key: PairKey) -> list[float]:
+        """Where a line on an obstacle ends of which that is known."""
+        own = (p for p in points if p.pair == key and all(p.sides))
+        return [p.at[0] for p in own if slides(p) or standing(mesh, p, 0) is None]
+
+    def allowed(self, mesh: Mesh, points: Sequence[ContactPoint], laid: Iterable[ContactPoint]) -> list[ContactPoint]:
+        """Of points that may begin to push those that do not stand for what is known: where lines end.
+
+        There one point presses, and nothing is spread along the element within which it is.
+        """
+        allowed, taken = list[ContactPoint](), dict[PairKey, set[int]]()
+        for point in laid:
+            pair = point.pair
+            if not all(point.sides):
+                taken.setdefault(pair, self._taken(mesh, points, pair))
+                found = self.element_of(mesh, point)
+                no = found is not None and found[1] in taken[pair]
+            else:
+                no = self.chosen(pair) and bool(self._ending(mesh, points, pair))
+                no |= point.at[0] in (0.0, 1.0) and self._node(point) in self._nodes(points, pair)
+            allowed += [] if no else [point]
+        return allowed
+
+    @staticmethod
+    def element_of(mesh: Mesh, point: ContactPoint) -> tuple[PairKey, int] | None:
+        """What a point presses on along one element, and the number of that; None where it does not."""
+        spread = not all(point.sides)
+        return (point.pair, mesh.cut_at(point.members[0], point.at[0]) - point.sides[0]) if spread else None
+
+    def _node(self, point: ContactPoint) -> str:
+        """The node at an end of the first member of a point."""
+        return self.scene.members[point.members[0]].nodes[int(point.at[0])]
+
+    def _nodes(self, points: Iterable[ContactPoint], pair: PairKey) -> set[str]:
+        """Nodes at which other members touch the obstacle of a pair."""
+        others = (p for p in points if p.contact == pair[0] and p.pair != pair and all(p.sides) and len(p.at) == 1)
+        return {self._node(p) for p in others if p.at[0] in (0.0, 1.0)}
+
+    def _taken(self, mesh: Mesh, points: Iterable[ContactPoint], key: PairKey) -> set[int]:
+        """The elements within which a line ends of which that is known; where elements end there, those beyond it."""
+        cuts, taken = mesh.cuts[key[1][0]], set[int]()
+        own = [p for p in points if p.pair == key]
+        pressed = {found[1] for found in (self.element_of(mesh, p) for p in own) if found}
+        for x in self._ending(mesh, own, key):
+            e = int(np.clip(np.searchsorted(cuts, x) - 1, 0, len(cuts) - 2))
+            margin = AT_END * float(cuts[e + 1] - cuts[e])
+            if cuts[e] + margin < x < cuts[e + 1] - margin:
+                taken.add(e)
+                continue
+            cut = e if x - cuts[e] < cuts[e + 1] - x else e + 1
+            within = {cut - 1, cut} & pressed
+            taken |= {cut - 1, cut} - within if len(within) == 1 else set()
+        return taken
 
     def deepest(self, fields: Fields, points: Sequence[ContactPoint], tolerance: float) -> list[Near]:
         """Of ends of elements on lines that penetrate, and are none of given points, those that do so more than the
@@ -162,6 +212,9 @@ class Lines:
             pair = self.closest.pairs[key]
             cuts = fields.model.mesh.cuts[pair.members[0]]
             known = {p.at[0] for p in points if p.pair == pair.key}
+            # What is within the element in which a line ends is seen when elements end there.
+            taken = self._taken(fields.model.mesh, points, key) if self.chosen(key) else set()
+            known |= {float(cuts[i]) for e in taken for i in (e, e + 1)}
             along = self.closest.along(fields, pair, fields.model.mesh, 0.0)
             near = {one.at[0]: one for one in along if one.at[0] not in known}
             gaps = np.array([near[x].gap if x in near else 0.0 for x in cuts.tolist()])
@@ -185,7 +238,8 @@ class Lines:
             # What touches at a node touches with all members there.
             places += [x for x in self._shared(pair, points) if x not in places]
             needed = least if pair.stop is not None else LINE
-            if len(places) < needed if key not in self.keys else not any(point.slides[0] for point in own):
+            known = key in self.keys
+            if (self.chosen(key) or not any(map(slides, own))) if known else len(places) < needed:
                 continue
             self.keys |= {key}
             longest = self._longest(pair, places)
@@ -198,10 +252,10 @@ class Lines:
 
     def _shared(self, pair: Pair, points: Points) -> list[float]:
         """Ends of the member of a pair on an obstacle that are nodes at which points of other members are."""
-        members = self.scene.members
-        others = [p for p in points if p.contact == pair.contact and len(p.members) == 1 and p.at[0] in (0.0, 1.0)]
-        nodes = {members[p.members[0]].nodes[int(p.at[0])] for p in others}
-        return [x for x, node in zip((0.0, 1.0), members[pair.members[0]].nodes, strict=True) if node in nodes]
+        nodes = self._nodes(points, pair.key)
+        return [
+            x for x, node in zip((0.0, 1.0), self.scene.members[pair.members[0]].nodes, strict=True) if node in nodes
+        ]
 
     def _longest(self, pair: Pair, places: Sequence[float]) -> float:
         """Longest part of the first member of a pair between places of a line, a fraction of its length."""
@@ -222,62 +276,130 @@ class Lines:
             mesh = mesh.refined(marks | {first: long})
         return mesh
 
-    def shortened(self, found: Solved, tolerance: float) -> tuple[frozenset[PairKey], list[Near]]:
-        """Lines on obstacles for which points may stand, and where these are.
-
-        Where the force is, of lines of one element; both ends of those on which so little is spread that it neither
-        bends the member between them by more than ``tolerance``, m, nor moves them.
-        """
-        fields, scales, near = found.fields, found.model.scales, list[Near]()
-        told = [(point, fields.contact_point(point)["push"]) for point in found.model.mesh.points]
-        short = set[PairKey]()
-        for key, stretches in self.stretches(found).items():
-            own = [(point, max(push, 0.0)) for point, push in told if point.pair == key]
-            pressed = sum(push for point, push in own if point.line)
-            # As a beam that is clamped at both ends.
-            softness = self.closest.lengths[key[1][0]] ** 3 / (384.0 * scales.force * scales.length**2)
-            sag = max(pressed * (s[-1] - s[0]) ** 3 / fields.stiffness(key[1][0], s[0]) for s in stretches) * softness
-            little = sag < tolerance and pressed < SPREAD * sum(push for _, push in own)
-            if not self.chosen(key) or not (little or all(len(stretch) <= FEWEST for stretch in stretches)):
-                continue
-            short.add(key)
-            places = list[float]()
-            for stretch in stretches:
-                if len(stretch) > FEWEST:
-                    places += [stretch[0], stretch[-1]]
-                    continue
-                at, pushes = np.array([(p.at[0], push) for p, push in own if p.at[0] in stretch]).T
-                if pushes.any():
-                    middle = float(at @ pushes / pushes.sum())
-                    # What lies beside an end of its member may slide there only from where it may go both ways.
-                    places.append(middle if 0.0 < middle < 1.0 else 0.5 * (stretch[0] + stretch[-1]))
-            near += self.closest.beside(fields, self.closest.pairs[key], np.array(places), np.inf)
-        return frozenset(short), near
+    def forget(self, mesh: Mesh, points: Iterable[ContactPoint]) -> None:
+        """What touches at places that all slide, or will, is no line."""
+        on = {p.pair for p in points if self.has(p) and standing(mesh, p, 0) is not None}
+        self.keys = frozenset(key for key in self.keys if key in on or not self.chosen(key))
 
     # -- ends -------------------------------------------------------------------------------------
 
-    def stretches(self, found: Solved) -> dict[PairKey, list[list[float]]]:
-        """Of each line the ends of elements that touch, those together that follow each other: fractions, rising."""
+    def stretches(self, found: Solved, lifted: float = 0.0) -> dict[PairKey, list[list[float]]]:
+        """Of each line the stretches that touch: where they begin, ends of elements within, and where they end.
+
+        Between them members are lifted by more than ``lifted``, m.
+        """
         stretches: dict[PairKey, list[list[float]]] = {}
         mesh, points = found.model.mesh, points_of(found)
         for key in sorted(key for key in self.keys if self.bends(key[1][0])):
-            cuts, own = mesh.cuts[key[1][0]], set[int]()
-            for point in (point for point in points if point.pair == key and self.has(point)):
-                cut = mesh.cut_at(key[1][0], point.at[0])
-                # What is spread is so along all of the element.
-                spread = point.line and not all(point.sides)
-                own |= {cut, cut + (-1 if point.sides[0] else 1)} if spread else {cut}
-            last = -2
-            for number in sorted(own):
+            cuts = mesh.cuts[key[1][0]]
+            own = sorted(self._extent(cuts, p) for p in points if p.pair == key and beside_ends(p))
+            spans = list[list[float]]()
+            last, slid = -2.0, False
+            for begin, end, low, high, ends in own:
+                beside = begin <= last + 1.0 and not (ends and slid)
                 # Also where nothing presses between: what is flat there may have no weight.
-                if number != last + 1 and not (
-                    last >= 0 and self.closest.lies(found.fields, key, float(cuts[last]), float(cuts[number]))
-                ):
-                    stretches.setdefault(key, []).append([])
-                    last = number - 1
-                stretches[key][-1] += cuts[last + 1 : number + 1].tolist()
-                last = number
+                if spans and (beside or self.closest.lies(found.fields, key, spans[-1][1], low, lifted)):
+                    spans[-1][1] = max(spans[-1][1], high)
+                else:
+                    spans.append([low, high])
+                last, slid = max(last, end), ends
+            stretches[key] = [
+                [low, *cuts[(cuts > low) & (cuts < high)].tolist(), *([high] if high > low else [])]
+                for low, high in spans
+            ]
         return stretches
+
+    @staticmethod
+    def _extent(cuts: Array, point: ContactPoint) -> tuple[float, float, float, float, bool]:
+        """Of a point the first and the last number of ends of elements, half of one within an element, where it begins
+        and ends, and whether it slides.
+        """
+        at = point.at[0]
+        cut = int(np.argmin(np.abs(cuts - at)))
+        if slides(point) and abs(cuts[cut] - at) > SAME_CUT:
+            number = float(np.searchsorted(cuts, at)) - 0.5
+            return number, number, at, at, True
+        first, last = cut, cut
+        if point.line and not all(point.sides):
+            first, last = cut - point.sides[0], cut + point.sides[1]
+            return float(first), float(last), float(cuts[first]), float(cuts[last]), False
+        return float(cut), float(cut), at, at, slides(point)
+
+    def ended(self, found: Solved, points: Sequence[ContactPoint], pushes: Array) -> tuple[Points, int]:
+        """Points of which one stands for all that presses on the last element at each end of a line, and none within
+        presses at a point; how many are others.
+        """
+        kept, new, mesh = list(points), list[ContactPoint](), found.model.mesh
+        force = {p.key: max(push, 0.0) for p, push in zip(points, pushes.tolist(), strict=True)}
+        for key, stretches in self.stretches(found, LIFTED * self.scene.size).items():
+            longest = PARTED * found.model.scales.length / self.closest.lengths[key[1][0]]
+            for stretch in stretches if self.chosen(key) and key[1][0] not in self.fixed else ():
+                sides = [(stretch[0], stretch[1:2]), (stretch[-1], stretch[-2:-1])]
+                if len(stretch) <= FEW and stretch[-1] - stretch[0] < longest:
+                    # What is so short is seen as one point, see :meth:`parted`.
+                    sides = [(stretch[0], stretch[-1:])]
+                for end, beside in sides:
+                    outer = self._within(mesh, kept, key, min([end, *beside]), max([end, *beside]))
+                    if len(sides) > 1:
+                        known = any(all(p.sides) and (slides(p) or p.at[0] == end) for p in outer)
+                    else:
+                        known = all(all(p.sides) for p in outer) and (len(outer) == 1 or all(map(slides, outer)))
+                    pressed = sum(force[p.key] for p in outer)
+                    if known or pressed == 0.0 or (end in (0.0, 1.0) and self._lies_at(found.fields, key, end)):
+                        continue
+                    at = sum(force[p.key] * self._middle(mesh, p) for p in outer) / pressed
+                    normal = self.closest.pairs[key].normal
+                    # It stays until its force is known, as what begins to touch does.
+                    still = ContactPoint(*key, (at,), (False,), outer[0].distance, normal=normal)
+                    kept, new = [p for p in kept if p not in outer], [*new, still]
+        ends, every = self.ends(found), (*points, *new)
+        inner = [
+            p for p in kept if all(p.sides) and self.has(p) and self.chosen(p.pair) and (p.pair, p.at[0]) not in ends
+        ]
+        inner = [p for p in inner if self._ending(mesh, every, p.pair)]
+        return (*(p for p in kept if p not in inner), *new), len(new) + len(inner)
+
+    def _within(
+        self, mesh: Mesh, points: Iterable[ContactPoint], key: PairKey, low: float, high: float
+    ) -> list[ContactPoint]:
+        """Points of a line between two places."""
+        cuts = mesh.cuts[key[1][0]]
+        own = ((p, self._extent(cuts, p)) for p in points if p.pair == key and beside_ends(p))
+        return [p for p, (*_, a, b, _) in own if low - SAME_CUT <= a and b <= high + SAME_CUT]
+
+    def _middle(self, mesh: Mesh, point: ContactPoint) -> float:
+        """Where a point presses: what is spread along an element does so at a third of it from where it is largest."""
+        *_, low, high, _ = self._extent(mesh.cuts[point.members[0]], point)
+        return low + (high - low) * (0.5 if all(point.sides) else 2.0 / 3.0 if point.sides[0] else 1.0 / 3.0)
+
+    def _lies_at(self, fields: Fields, key: PairKey, end: float) -> bool:
+        """Whether a member is on an obstacle at its end."""
+        return self.closest.gap_at(fields, key, end) < LIFTED * self.scene.size
+
+    def known(self, points: Iterable[ContactPoint]) -> bool:
+        """Whether it is known where a line ends."""
+        return any(slides(p) and p.pair in self.keys and self.chosen(p.pair) for p in points)
+
+    def unended(self, mesh: Mesh, points: Points, fields: Fields) -> Points:
+        """Points with what may press at the ends of elements beside them for those that slide where lines end."""
+        kept = [p for p in points if not self.known([p])]
+        for p in (p for p in points if self.known([p])):
+            cuts, pair = mesh.cuts[p.members[0]], self.closest.pairs[p.pair]
+            i = int(np.clip(np.searchsorted(cuts, p.at[0]), 1, len(cuts) - 1))
+            near = [n for n in self.closest.along(fields, pair, mesh, np.inf) if n.at[0] in (cuts[i - 1], cuts[i])]
+            have = {(k.at, k.sides) for k in kept if k.pair == p.pair}
+            kept += [k for k in self.allowed(mesh, kept, self.laid(near)) if (k.at, k.sides) not in have]
+        return tuple(kept)
+
+    def ends(self, found: Solved) -> set[tuple[PairKey, float]]:
+        """Where lines for which it is chosen what presses begin and end: there what presses at a point may slide."""
+        return {
+            (key, end)
+            for key, stretches in self.stretches(found, LIFTED * self.scene.size).items()
+            if self.chosen(key) and key[1][0] not in self.fixed
+            for stretch in stretches
+            for end in (stretch[0], stretch[-1])
+        }
 
     def points_on(self, mesh: Mesh, found: Solved) -> Points:
         """The points of a state on a finer mesh, with those of lines at new ends of elements between old ones."""
@@ -287,22 +409,38 @@ class Lines:
             near = self.closest.along(found.fields, self.closest.pairs[key], mesh, np.inf)
             laid = self.laid(one for one in near if any(s[0] <= one.at[0] <= s[-1] for s in stretches))
             ends = {x for stretch in stretches for x in (stretch[0], stretch[-1])}
+            laid = self.allowed(mesh, points, laid)
             laid = [p for p in laid if not (self.chosen(key) and all(p.sides)) or p.at[0] in ends]
             points = (*points, *(p for p in laid if (p.at[0], p.sides) not in known))
         return points
 
-    def fitted(self, mesh: Mesh, points: Points, *, prescribed: bool = False) -> Mesh:
-        """A mesh whose elements end where points slide, as members bend otherwise to both sides of a force.
+    def fitted(self, mesh: Mesh, points: Points, *, prescribed: bool = False) -> tuple[Mesh, Points]:
+        """A mesh whose elements end where points slide, as members bend otherwise to both sides of a force, and points.
 
-        An end of elements that is near is moved there, else there is one more; never in a ``prescribed`` mesh, of
-        which the nearest is moved.
+        An end of elements that is near is moved there, and what presses there with it, else there is one more; never in
+        a ``prescribed`` mesh, of which the nearest is moved.
         """
-        cuts = dict(mesh.cuts)
+        cuts, moved = dict(mesh.cuts), dict[tuple[str, float], float]()
         for point in points:
-            for member, x, slides in zip(point.members, point.at, point.slides, strict=True):
-                if slides and 0.0 < x < 1.0 and not self.closest.stiff(member):
-                    cuts[member] = self._with_end(cuts[member], member, x, prescribed or member in self.fixed)
-        return replace(mesh, cuts=cuts)
+            for member, x, free in zip(point.members, point.at, point.slides, strict=True):
+                if free and 0.0 < x < 1.0 and not self.closest.stiff(member):
+                    before = cuts[member]
+                    cuts[member] = after = self._with_end(before, member, x, prescribed or member in self.fixed)
+                    if len(after) == len(before):
+                        moved |= {(member, float(before[i])): x for i in np.flatnonzero(after != before)}
+        kept = tuple(
+            p if slides(p) else replace(p, at=(moved.get((p.members[0], p.at[0]), p.at[0]), *p.at[1:])) for p in points
+        )
+        return replace(mesh, cuts=cuts, points=()), kept
+
+    def moved(self, before: Mesh, after: Mesh) -> dict[str, float]:
+        """How far, over the size, ends of elements of each member are moved, or are from any that there were."""
+        return {
+            name: float(np.abs(cuts[:, None] - before.cuts[name]).min(axis=1).max())
+            * self.scene.center_lines[name].length
+            / self.scene.size
+            for name, cuts in after.cuts.items()
+        }
 
     def _with_end(self, cuts: Array, member: str, x: float, keeps: bool) -> Array:
         """Ends of elements of a member with one at a place; as many as before if it ``keeps`` their number."""
@@ -350,33 +488,6 @@ class Lines:
                     marks[first][near] |= bends > LOCATED * accuracy
         return marks
 
-    def with_moved_ends(
-        self, found: Solved, least: tuple[float, float], before: dict[tuple[str, int], tuple[float, float]]
-    ) -> tuple[Mesh, Points] | None:
-        """Mesh and points where elements end where lines on obstacles do; None where they do well enough.
-
-        ``least`` are how far, over the unit of length, and by which rotation, rad, that moves anything at least;
-        ``before`` has what was missing at each end of elements the last time, and how far it was moved; of this one
-        then.
-        """
-        mesh, moved = found.model.mesh, dict[tuple[str, float], float]()
-        for key, stretches in self.stretches(found).items():
-            member, follows = key[1][0], self.chosen(key) and key[1][0] not in self.fixed
-            breaks = breaks_of(self.scene, member)
-            for stretch in stretches if follows else ():
-                for at, way in ((stretch[0], -1), (stretch[-1], 1)):
-                    if 0.0 < at < 1.0 and np.abs(breaks - at).min() > SAME_CUT and (member, at) not in moved:
-                        there = self._end(found, key, at, way if len(stretch) > 1 else 0, least, before)
-                        moved |= {} if there == at else {(member, at): there}
-        if not moved:
-            return None
-        cuts = {m: np.array([moved.get((m, x), x) for x in c.tolist()]) for m, c in mesh.cuts.items()}
-        points = tuple(
-            replace(p, at=tuple(moved.get((m, x), x) for m, x in zip(p.members, p.at, strict=True)))
-            for p in points_of(found)
-        )
-        return replace(mesh, cuts=cuts, points=()), points
-
     def parted(
         self, found: Solved, deep: float, turned: float, known: Collection[PairKey] = ()
     ) -> tuple[Mesh, Points, PairKey] | None:
@@ -396,7 +507,7 @@ class Lines:
             if not 0 < cut < len(cuts) - 1 or abs(cuts[cut] - at) > AT_END * (cuts[cut + 1] - cuts[cut - 1]):
                 near = self.closest.found(found.fields, -deep, [self.closest.pairs[point.pair]])
                 if any(abs(one.at[0] - at) < np.diff(cuts).max() for one in near):
-                    return replace(self.fitted(mesh, (point,)), points=()), points, ("", ())
+                    return self.fitted(mesh, (point,))[0], points, ("", ())
                 continue
             low, high, depth, angle = self._ends_of(found, point, cut)
             short = (high - low) * self.closest.lengths[member] < PARTED * found.model.scales.length
@@ -444,47 +555,9 @@ class Lines:
 
         It is seen over a share of the ``room`` there, a fraction of the length.
         """
-        places = ASIDE + AHEAD * ROOM * room * np.array([0.0, 0.5, 1.0])
+        places = ASIDE + AHEAD * room * np.array([0.0, 0.5, 1.0])
         _, grows, bends = np.polyfit(places, [self.closest.bends(fields, key, at + way * x) for x in places], 2)
         return float(grows), float(bends)
-
-    def _end(
-        self,
-        found: Solved,
-        key: PairKey,
-        at: float,
-        way: int,
-        moving: tuple[float, float],
-        known: dict[tuple[str, int], tuple[float, float]],
-    ) -> float:
-        """Where a line ends that has its last end of elements at a place, on the side ``way`` of it, 1 or -1.
-
-        Beyond it the curvature of the gap grows from zero, which it is along the line: the end is where that
-        begins.  What touches alone, ``way`` 0, does so where the gap is least.
-        """
-        member, fields, unit = key[1][0], found.fields, found.model.scales.length
-        cuts, length = found.model.mesh.cuts[member], self.closest.lengths[member] / unit
-        cut = found.model.mesh.cut_at(member, at)
-        before, beyond = float(cuts[cut - 1]) - at, float(cuts[cut + 1]) - at
-        grows, bends = self._curves(fields, key, at, way, beyond if way > 0 else -before)
-        if way == 0:
-            # Half of the way: where the force goes what is nearest goes on.
-            nearest = [near.at[0] for near in self.closest.found(fields, LEAST * unit, [self.closest.pairs[key]])]
-            apart = 0.5 * min((x - at for x in nearest), key=abs, default=0.0)
-        else:
-            # Where it does not grow the end is far away: back where the member bends away, else onwards.
-            apart = -way * bends / grows if grows > 0.0 else -way * float(np.sign(bends))
-        missing, (former, moved) = apart, known.get((member, cut), (0.0, 0.0))
-        # Where it ends moves on as elements are moved: by secants.
-        if moved and SHARES[0] < (former - missing) / moved < SHARES[1]:
-            apart *= moved / (former - missing)
-        # Elements do not become too short: what is in less than one is a point.
-        least = SLENDEREST * min(beyond, -before)
-        low, high = max(ROOM * before, min(before + least, 0.0)), min(ROOM * beyond, max(beyond - least, 0.0))
-        apart = min(max(apart, low), high)
-        known[member, cut] = missing, apart
-        far = abs(apart) * length > moving[0] and abs(bends * unit * apart) * length > moving[1]
-        return at + apart if far else at
 
 
 def points_of(found: Solved) -> Points:
@@ -498,6 +571,11 @@ def points_in(fields: Fields) -> Points:
         replace(point, at=fields.contact_point(point)["at"]) if any(point.slides) else point
         for point in fields.model.mesh.points
     )
+
+
+def slides(one: ContactPoint | Near) -> bool:
+    """Whether a place on the first member is an unknown."""
+    return isinstance(one, ContactPoint) and one.slides[0]
 
 
 def beside_ends(one: ContactPoint | Near) -> bool:

@@ -71,6 +71,9 @@ TOUCHED = 4e-5
 SUDDEN = 3.0
 """How many times faster than in the step before what is followed may turn, where it turns by a little at all."""
 
+PATIENT = 2.0**-6
+"""Step down to which the ends of lines are followed; in shorter ones they are sought anew."""
+
 NARROW = 2.0**-8
 """Step below which a loss of stability is taken for located, part of the way."""
 
@@ -90,10 +93,6 @@ LASTING = 1e-9
 
 ALLOWED = 1e-3
 """Largest penetration over the sum of the radii, whatever accuracy is asked for."""
-
-ENDS = 8
-"""Times that ends of lines are located on one mesh: each time their error falls by a share of itself, or to its square.
-"""
 
 ROUGH, REFINED = 0.05, 8
 """Roughness, see :func:`~sfetcas.mechanics.accuracy.roughness`, from which elements are divided on the way, as what is
@@ -170,7 +169,7 @@ class MemberContact:
         self.jumps: list[tuple[float, str]] = []
         self.redundant: bool | None = None
         self.lines = Lines(scene, self.closest, fixed)
-        self.falls = 0
+        self.falls, self.patient = 0, False
         self.edges = Edges(scene, self.closest, self.tolerance)
 
     # -- begin ------------------------------------------------------------------------------------
@@ -256,15 +255,25 @@ class MemberContact:
     # -- one loading ------------------------------------------------------------------------------
 
     def solved(
-        self, mesh: Mesh, points: Points, source: Solved, way: Way, since: Solved | None = None, drag: float = 0.0
+        self,
+        mesh: Mesh,
+        points: Points,
+        source: Solved,
+        way: Way,
+        since: Solved | None = None,
+        drag: float = 0.0,
+        ends: bool = False,
     ) -> Solved | None:
         """The equilibrium with given points from a near state; None if Newton's method does not converge.
 
         With ``drag`` rotations since another state are resisted, see :class:`~sfetcas.solvers.pseudo_transient.Drag`.
         """
         numbered = self.lines.set_out(mesh, points)
-        if self.lines.keys and not (self.scene.rubs or self.redundant):
-            numbered, source = self._pressing(mesh, numbered, source, way, since, drag)
+        if self.lines.keys and not self.scene.rubs:
+            pressing = self._pressing(mesh, numbered, source, way, since, drag)
+            if pressing is None and ends:
+                return None
+            numbered, source = pressing or (numbered, source)
         for _ in FIRM if self.scene.rubs and points else (1.0,):
             set_up = self.gripping.set_up(source.fields, mesh, numbered)
             found = self._corrected(replace(mesh, points=set_up), source, way, since, drag)
@@ -275,8 +284,8 @@ class MemberContact:
 
     def _pressing(
         self, mesh: Mesh, points: list[ContactPoint], source: Solved, way: Way, since: Solved | None, drag: float
-    ) -> tuple[list[ContactPoint], Solved]:
-        """Those of given points, and of those beside them on lines, that push, and where; as given if none is found."""
+    ) -> tuple[list[ContactPoint], Solved] | None:
+        """Those of given points, and of those beside them on lines, that push, and where; None if none is found."""
         every = self.lines.set_out(mesh, [*points, *self.lines.beside(mesh, points, source.fields)])
         free = [i for i, point in enumerate(every) if len(point.members) == 1 and not any(point.slides)]
         if not free:
@@ -287,14 +296,16 @@ class MemberContact:
         prepared.equations.redundant = False
         rows = {name: i for i, name in enumerate(prepared.model.row_names)}
         pushing = np.array([rows[every[i].rows(prepared.model.element.axes)[-1]] for i in free])
-        acting = np.array([i < len(points) for i in free])
+        # What presses on an element does so with both its forces, if only rounding chooses.
+        halves = {self.lines.element_of(mesh, point) for point in points}
+        acting = np.array([i < len(points) or self.lines.element_of(mesh, every[i]) in halves - {None} for i in free])
         resisting = None if since is None else self._drag(prepared, since, drag)
         loads, state = way(prepared.model), self.carried(source, prepared)
         system = OneSided(prepared.equations, loads, prepared.weight, None, None, resisting, pushing, acting)
         with np.errstate(over="ignore", invalid="ignore"):
             found = correct(system, state, limits=Limits(iterations=ITERATIONS, most=TURN, contraction=2.0))
         if not found.converged:
-            return points, source
+            return None
         # What pushes by rounding may as well not: on another processor it does not.
         pushes = np.where(system.acting, -found.state.lam[pushing], 0.0)
         acts = pushes > LASTING * pushes.max(initial=0.0)
@@ -430,21 +441,41 @@ class MemberContact:
                     y[number] = displaced[member][cut, k]
 
     def resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float = 0.0) -> Solved | None:
-        """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found."""
-        lines = self.lines.keys
-        found = self._resolved(mesh, points, source, way, drag)
+        """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found.
+
+        Where it is known where lines end these places go on sliding; where that leads nowhere, or is not known, forces
+        at ends of elements show where they end, and these slide from there.
+        """
+        lines, found = self.lines.keys, None
+        known = self.lines.known(points)
+        if known:
+            found = self._resolved(mesh, points, source, way, drag, True)
+        if found is None and not (known and self.patient):
+            self.lines.keys = lines
+            if known:
+                points = self.lines.unended(mesh, points, source.fields)
+            found = self._resolved(mesh, points, source, way, drag, False)
+            if found is not None and not drag and any(map(self.lines.chosen, self.lines.keys)):
+                lines = self.lines.keys
+                ended = self._resolved(replace(found.model.mesh, points=()), points_of(found), found, way, drag, True)
+                if ended is None or self.turned(found.fields, ended.fields) > STRIDE:
+                    self.lines.keys = lines
+                else:
+                    found = ended
         if found is None:
             # What was taken for a line on the way to nothing is none.
             self.lines.keys = lines
         return found
 
-    def _resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float) -> Solved | None:
+    def _resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float, ends: bool) -> Solved | None:
         tried: set[object] = set()
         since, solved, several, least = source, False, False, LINE
         self.edges.begin(source.fields)
-        careful, alone, ends = False, set[object](), set[PairKey]()
-        for _ in range(ROUNDS):
-            found = self.solved(mesh, points, source, way, since if drag else None, drag)
+        careful, alone, short = False, set[object](), set[PairKey]()
+        for _ in range(ROUNDS // 3 if ends else ROUNDS):
+            found = self.solved(mesh, points, source, way, since if drag else None, drag, ends)
+            if found is None and ends:
+                return None
             if found is None:
                 if solved and several:
                     # All at once is faster; where that leads nowhere, one after the other.
@@ -455,15 +486,17 @@ class MemberContact:
                 else:
                     return None
             lined = None if careful else self.lines.lengthened(found, least)
-            parted = None if careful or lined else self.lines.parted(found, self.tolerance, np.inf, ends)
+            parted = None if careful or lined else self.lines.parted(found, self.tolerance, np.inf, short)
             if parted is not None:
                 lined = parted[:2]
-                ends |= {parted[2]}
+                short |= {parted[2]}
             if lined is not None:
                 (mesh, points), several = lined, False
             else:
-                points, changes = self._changed(found, tried, careful)
+                points, changes = self._changed(found, tried, careful, ends)
                 several = changes > 1 and not careful
+                if ends:
+                    self.lines.forget(mesh, points)
                 if not changes:
                     return found
                 if changes == 1:
@@ -475,12 +508,16 @@ class MemberContact:
             source, solved = found, True
         return None
 
-    def _changed(self, found: Solved, tried: set[object], careful: bool) -> tuple[Points, int]:
-        """The points to try next, where they are now, and how many are others than before; at most one if careful."""
+    def _changed(self, found: Solved, tried: set[object], careful: bool, ended: bool) -> tuple[Points, int]:
+        """The points to try next, where they are now, and how many are others than before; at most one if careful.
+
+        With ``ended`` points slide where lines end.
+        """
         fields, points = found.fields, found.model.mesh.points
         told = [fields.contact_point(point) for point in points]
         now = [replace(point, at=entry["at"]) for point, entry in zip(points, told, strict=True)]
         pushes = np.array([entry["push"] for entry in told])
+        ends = self.lines.ends(found) if ended else set()
         wrong = self._wrong(found, now, pushes)
         more = self._penetrating(fields, [point for point, off in zip(now, wrong, strict=True) if not off])
         states = ["wrong" if off else "right" for off in wrong] + ["new"] * len(more)
@@ -490,17 +527,20 @@ class MemberContact:
             worst = int(np.argmin(np.where(wrong, pushes, np.inf))) if wrong.any() else -1
             kept = [point for i, point in enumerate(now) if i != worst]
             more = () if wrong.any() else more[:1]
-            return (*(self._freed(fields, point) for point in kept), *more), 1
+            return (*(self._freed(fields, point, ends) for point in kept), *more), 1
         tried.add(key)
         if wrong.any() or more:
             kept = [point for point, off in zip(now, wrong, strict=True) if not off]
-            slid = tuple(self._freed(fields, point) for point in kept)
+            slid = tuple(self._freed(fields, point, ends) for point in kept)
             # What begins to slide on an obstacle may do away with what penetrates beside it.
             begins = {p.pair for p, old in zip(slid, kept, strict=True) if p.slides != old.slides and len(p.at) == 1}
             more = tuple(point for point in more if point.pair not in begins)
             return (*slid, *more), int(wrong.sum()) + len(more) + len(begins)
+        new, count = self.lines.ended(found, now, pushes) if ended else ((), 0)
+        if count:
+            return new, 2
         kept = self._merged(now, pushes)
-        slid = self.edges.joined(tuple(self._freed(fields, point) for point in kept))
+        slid = self.edges.joined(tuple(self._freed(fields, point, ends) for point in kept))
         moved = self.gripping.off_centre(fields, points, now)
         return slid, int(moved or slid != tuple(now))
 
@@ -515,6 +555,9 @@ class MemberContact:
         wrong |= np.array([self.lines.has(p) and not self.lines.chosen(p.pair) for p in now], dtype=bool) & (
             pushes < rounding
         )
+        # Within a line what slides and does not press is no end of it.
+        ended = [any(p.slides) and p.pair in self.lines.keys and self.lines.chosen(p.pair) for p in now]
+        wrong |= np.array(ended, dtype=bool) & (pushes < rounding)
         # What is new sticks, and may pull only because it does.
         return wrong & np.array([not (point.new and point.grip) for point in found.model.mesh.points], dtype=bool)
 
@@ -541,8 +584,11 @@ class MemberContact:
         near = bool(other.edge) and other.new
         return point.pair == other.pair and (near or self.closest.alike(point.pair, point.at, other.at, share))
 
-    def _freed(self, fields: Fields, point: ContactPoint) -> ContactPoint:
-        """A point as it slides from where it is, though not beyond ends; along a line it stays on the first member."""
+    def _freed(self, fields: Fields, point: ContactPoint, ends: Collection[tuple[PairKey, float]]) -> ContactPoint:
+        """A point as it slides from where it is, though not beyond ends; along a line it stays on the first member.
+
+        ``ends`` are where lines end.
+        """
         if point.edge:
             return self.edges.freed(fields, point)
         normal = self.closest.pairs[point.pair].normal
@@ -559,7 +605,8 @@ class MemberContact:
             slopes = self.closest.slopes(fields, point.pair, at)
             # At an end a point goes inwards where that is nearer; what lies there stays.
             free = [0.0 < x < 1.0 or (0.5 - x) * slope < -LIES for x, slope in zip(at, slopes.tolist(), strict=True)]
-        slides = (free[0] and not self.lines.has(point), *free[1:])
+        ends_line = all(point.sides) and not point.line and (point.pair, point.at[0]) in ends
+        slides = (free[0] and (ends_line or not self.lines.has(point)), *free[1:])
         same = not point.new and slides == point.slides
         return point if same else replace(point, slides=slides, normal=normal, new=False)
 
@@ -572,7 +619,9 @@ class MemberContact:
             if deep and not any(self._same(one, point) for point in points if not self.lines.has(point)):
                 found.append(one)
         found.sort(key=lambda one: one.gap)
-        return tuple(p for one in found for p in (self.lines.laid([one]) if self.lines.has(one) else [begun(one)]))
+        mesh, lines = fields.model.mesh, self.lines
+        laid = (lines.allowed(mesh, points, lines.laid([one])) if lines.has(one) else [begun(one)] for one in found)
+        return tuple(itertools.chain.from_iterable(laid))
 
     # -- steps ------------------------------------------------------------------------------------
 
@@ -643,11 +692,14 @@ class MemberContact:
     def follow(self, way: Callable[[float], Way], start: Solved) -> Solved | None:
         """The state at the end of a way, ``way(1)``, from its begin; None if it is lost."""
         self.jumps, self.falls, mesh = [], 0, replace(start.model.mesh, points=())
+        self.patient = False
         now, step, left, pace = _Step(0.0, start), self.first, -1.0, 0.0
         while now.part < 1.0:
             self.reached = now
             part, lines = min(1.0, now.part + step), self.lines.keys
+            self.patient = step > PATIENT
             there = self._next(mesh, now.solved, way(part))
+            self.patient = False
             begun = None if there is None else self.gripping.begins(there.model.mesh.points, TOUCHED * self.first)
             if begun is not None:
                 # What begins to touch is where it was then: steps end there.
@@ -731,39 +783,6 @@ class MemberContact:
                 return None
             found = finer
         return found
-
-    def with_ends(self, found: Solved, way: Way, least: tuple[float, float]) -> Solved | None:
-        """The state with elements that end where lines on obstacles do; None where it is not found.
-
-        ``least`` as of :meth:`.Lines.with_moved_ends`.
-        """
-        before: dict[tuple[str, int], tuple[float, float]] = {}
-        for _ in range(ENDS):
-            # What touches at single places slides there.
-            found = self.as_points(found, way) or found
-            moved = self.lines.with_moved_ends(found, least, before)
-            if moved is None:
-                break
-            there = self.resolved(*moved, found, way)
-            if there is None or self.turned(found.fields, there.fields) > STRIDE:
-                return None
-            found = there
-        return found
-
-    def as_points(self, found: Solved, way: Way) -> Solved | None:
-        """The state with points for lines on obstacles where these are as good; None where they are not."""
-        short, near = self.lines.shortened(found, self.tolerance)
-        if not short:
-            return None
-        lines, self.lines.keys = self.lines.keys, self.lines.keys - short
-        points = [point for point in points_of(found) if point.pair not in short]
-        # They stay until their force is known, as what begins to touch does.
-        points += [replace(begun(one), normal=self.closest.pairs[one.pair].normal, new=False) for one in near]
-        there = self.resolved(replace(found.model.mesh, points=()), tuple(points), found, way)
-        if there is None or short & self.lines.keys or self.turned(found.fields, there.fields) > STRIDE:
-            self.lines.keys = lines
-            return None
-        return there
 
     def as_lines(self, found: Solved, way: Way, turned: float) -> Solved | None:
         """The state with the two ends of each short line that one point stood for; None where there is none.

@@ -47,8 +47,8 @@ SHARES = (1.0, 1e-2, 1e-4)
 yet touch.
 """
 
-FELT = 1e-5
-"""Rotation, over the accuracy, that the end of a line makes by being elsewhere, below which it stays."""
+FITS = 3
+"""Times that elements are made to end where points slide: each time what that moves these by falls to its square."""
 
 POINTED = 0.1
 """Rotation, over the accuracy, up to which a short line is taken for a point."""
@@ -166,11 +166,10 @@ class MemberContactSteps:
         if now.model.mesh.order != target.order or self.meshes.fixed:
             mesh = target if self.meshes.fixed else replace(now.model.mesh, order=target.order)
             now = self._onto(mesh, now, factor)
-        smooth, error, lined, run = np.sqrt(accuracy), np.inf, 0, self.run
+        smooth, error, run = np.sqrt(accuracy), np.inf, self.run
         for _ in range(LEVELS):
-            if now.model.mesh.elements > lined:
-                pointed, lined = run.as_points(now, lambda model: model.loading(factor)), now.model.mesh.elements
-                now = pointed or now
+            # Elsewhere than at ends of elements forces on them would be taken for roughness.
+            now = self._fitted(now, factor)
             rough, model = roughness(now.fields) > smooth, now.model
             ends = run.lines.rough_ends(now, accuracy)
             fine = {n: long & (n not in self.meshes.fixed) for n, long in run.lines.long(now).items()}
@@ -180,7 +179,7 @@ class MemberContactSteps:
                     break
                 now = self._onto(model.mesh.refined(marks, now.fields.kinks), now, factor)
                 continue
-            now = self._fitted(self._with_ends(now, factor), factor)
+            now = self._fitted(now, factor)
             if not self.meshes.prescribed:
                 now = run.as_lines(now, lambda model: model.loading(factor), POINTED * accuracy) or now
             marks = run.lines.long(now)
@@ -195,7 +194,7 @@ class MemberContactSteps:
             # What members penetrate each other by is an error of positions too.
             error = max(error, run.penetration(now.fields) / self.scene.size)
             if error <= accuracy:
-                now = self._with_ends(now, factor)
+                now = self._fitted(now, factor, FITS)
                 break
             smooth *= 0.1
         refuse_large(now.fields)
@@ -211,21 +210,20 @@ class MemberContactSteps:
         refuse_lost_forces(answer)
         return answer
 
-    def _fitted(self, now: Solved, factor: float) -> Solved:
-        """The state with elements that end where points slide; the same where that is not found."""
-        points, run = points_of(now), self.run
-        mesh = run.lines.fitted(now.model.mesh, points, prescribed=self.meshes.prescribed)
-        if all(np.array_equal(mesh.cuts[name], cuts) for name, cuts in now.model.mesh.cuts.items()):
-            return now
-        there = run.resolved(replace(mesh, points=()), points, now, lambda model: model.loading(factor))
-        return now if there is None or run.turned(now.fields, there.fields) > NEAR else there
-
-    def _with_ends(self, now: Solved, factor: float) -> Solved:
-        """The state with elements that end where lines on obstacles do; as it is in a prescribed mesh, or not found."""
-        if self.meshes.prescribed:
-            return now
-        least = self.meshes.accuracy, FELT * self.meshes.accuracy
-        return self.run.with_ends(now, lambda model: model.loading(factor), least) or now
+    def _fitted(self, now: Solved, factor: float, times: int = 1) -> Solved:
+        """The state with elements that end where points slide; as far as that is found."""
+        run, way = self.run, lambda model: model.loading(factor)
+        for _ in range(times):
+            points, before = points_of(now), now.model.mesh
+            mesh, points = run.lines.fitted(before, points, prescribed=self.meshes.prescribed)
+            far = max(run.lines.moved(before, mesh).values(), default=0.0)
+            if far < self.meshes.accuracy:
+                break
+            there = run.resolved(mesh, points, now, way)
+            if there is None or run.turned(now.fields, there.fields) > NEAR:
+                break
+            now = there
+        return now
 
     def _onto(self, mesh: Mesh, found: Solved, factor: float) -> Solved:
         """The same state on another mesh.

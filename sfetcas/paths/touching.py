@@ -523,7 +523,7 @@ class Touching(Conditions[_At]):
 
     def fitted(self, mesh: Mesh, fields: Fields) -> Mesh:
         """As of :class:`.Conditions`."""
-        fitted = self.run.lines.fitted(mesh, points_in(fields))
+        fitted, _ = self.run.lines.fitted(mesh, points_in(fields))
         return mesh if mesh.same(fitted) else fitted
 
     def _freed(self, fields: Fields, point: ContactPoint) -> ContactPoint:
