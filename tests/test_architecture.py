@@ -174,6 +174,7 @@ ORDER = [
     "contact.lines",
     "contact.edges",
     "contact.member_contact",
+    "contact.kept",
     "contact.held_inside",
     "contact.touches",
     "contact.settling",

@@ -72,7 +72,6 @@ METHODS = pytest.mark.parametrize(
             {"type": "path", "range": [0, 1]},
             "contacts.plane: found friction with analysis.type = 'path', accepted: with 'static', where the order",
         ),
-        (0.3, {"type": "modes"}, "contacts.plane: found an obstacle with analysis.type = 'modes'"),
         (
             0.3,
             {"type": "dynamic", "end": 1.0, "integrator": "idas"},

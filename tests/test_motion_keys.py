@@ -290,10 +290,11 @@ STOPPED = {"springs/k": {"node": "A", "stiffness": 1.0, "stop": [-1, 1]}}
 
 def test_obstacles_are_refused():
     refused(
-        {**of_type("modes"), **FLOOR},
-        "contacts.floor: found an obstacle with analysis.type = 'modes', accepted: with 'static', 'dynamic', "
+        {**of_type("path"), "analysis/modes": 1, **FLOOR},
+        "contacts.floor: found an obstacle with analysis.modes on a path, accepted: with 'static', 'modes', 'dynamic', "
         "or 'path' without modes",
     )
+    assert made({**of_type("modes"), **FLOOR})
     assert made({**of_type("static"), **FLOOR, **STOPPED})
     assert made({**of_type("dynamic"), **FLOOR, **STOPPED})
     assert made({**of_type("modes"), "springs/k": {"node": "A", "stiffness": 1.0}})

@@ -45,21 +45,21 @@ def check_masses(
 
 
 def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], springs: Mapping[str, Spring]) -> None:
-    """Refuse contacts, which vibrations cannot treat, and stops, which vibrations along paths cannot.
+    """Refuse contacts and stops, which vibrations along paths cannot treat.
 
     Raises
     ------
     SceneError
         Names the first contact or stop.
     """
-    given = "analysis.modes on a path" if analysis.type == "path" else f"analysis.type = {analysis.type!r}"
-    for name in contacts if analysis.type != "dynamic" else ():
-        message = f"found an obstacle with {given}, accepted: with 'static', 'dynamic', or 'path' without modes"
-        raise SceneError(message, ("contacts", name))
+    if analysis.type != "path":
+        return
+    given = "with analysis.modes on a path, accepted: with 'static', 'modes', 'dynamic', or 'path' without modes"
+    for name in contacts:
+        raise SceneError(f"found an obstacle {given}", ("contacts", name))
     for name, spring in springs.items():
-        if spring.stop is not None and analysis.type == "path":
-            message = f"found a stop with {given}, accepted: with 'static', 'modes', 'dynamic', or 'path' without modes"
-            raise SceneError(message, ("springs", name, "stop"))
+        if spring.stop is not None:
+            raise SceneError(f"found a stop {given}", ("springs", name, "stop"))
 
 
 def check_contact(

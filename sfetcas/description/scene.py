@@ -313,7 +313,7 @@ class Scene(Record):
         """
         if any(_why_points(self, name) for name in self.contacts):
             return True
-        return bool(self.contacts) and self.analysis.type == "static"
+        return bool(self.contacts) and self.analysis.type in ("static", "modes")
 
     @property
     def rubs(self) -> bool:
@@ -1045,7 +1045,7 @@ def _check_points(scene: Scene) -> None:
     if on_path and scene.rubs:
         name, what = next((name, "friction") for name, contact in scene.contacts.items() if contact.friction > 0.0)
     where, found = ("contacts", name), f"found {what}"
-    if scene.analysis.type != "static" and (scene.rubs or not on_path):
+    if scene.analysis.type not in ("static", "modes") and (scene.rubs or not on_path):
         message = f"{found} with analysis.type = {scene.analysis.type!r}"
         known = {"friction": "'static', where the order of steps is known, or 'dynamic'"}
         accepted = known.get(what, "'static' or 'path'")

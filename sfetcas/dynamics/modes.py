@@ -12,6 +12,7 @@ import os
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
 
@@ -19,13 +20,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import tolerances
+from ..contact.kept import Kept
 from ..description.records import counted, nearest
 from ..description.scene import Scene, check_held
 from ..description.showing import notes_in_words, number_in_words, shown
 from ..equilibria import statics
 from ..equilibria.meshing import Meshing
 from ..equilibria.settings import Settings
-from ..equilibria.single import finished
+from ..equilibria.single import finished, solved_from
 from ..equilibria.solution import Equilibrium, heading, heading_in_words
 from ..equilibria.stops import solve_stopped
 from ..errors import SceneError, SolveError, Status
@@ -71,6 +73,9 @@ HALVINGS = 7
 
 MOST_ELEMENTS = 4000
 """A mesh that is halved does not grow beyond this."""
+
+ENDS = 6
+"""Times that ends of lines are moved on a mesh, at most: each time the error is about squared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,6 +303,7 @@ class ModalAnalysis:
         self.count = scene.analysis.count_of_modes
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.rest = self._equilibrium()
+        self.kept = self._kept()
 
     def _equilibrium(self) -> Equilibrium | None:
         """The equilibrium of the loads; None where there are none."""
@@ -305,20 +311,41 @@ class ModalAnalysis:
         sprung = any(spring.rest or spring.length is not None for spring in scene.springs.values())
         everywhere = scene.gravity is not None or scene.rotating is not None
         strung = scene.stopped or any(tendon.elastic_string for tendon in scene.tendons.values())
-        if not any(scene.driven) and not everywhere and not sprung and not strung:
+        if not any(scene.driven) and not everywhere and not sprung and not strung and not scene.contacts:
             return None
-        check_held(scene)
+        if not scene.contacts:
+            check_held(scene)
         found = (solve_stopped if scene.stopped else statics.solve)(scene, self.settings)
         self.seconds = dict(found.seconds)
         for what in undecided(found.last.fields):
             raise SolveError(Status.KINK, f"{what}, so that no vibration is", found.last.state)
         return found.last
 
+    def _kept(self) -> Kept | None:
+        """What touches at the equilibrium; None where there is nothing that could.
+
+        Raises
+        ------
+        SolveError
+            The smallest vibration would change what touches, or members lie along what is not kept.
+        """
+        if self.rest is None or not self.scene.contacts:
+            return None
+        prepare = partial(prepared_for_motion, self.scene)
+        kept = Kept(self.scene, prepare, self.accuracy, self.meshing.fixed, solved_from(self.rest))
+        for what in kept.lines():
+            detail = f"{what}, accepted with modes: places that touch, and lines on obstacles without friction"
+            raise SolveError(Status.FAILED, detail, self.rest.state)
+        for what in kept.undecided():
+            raise SolveError(Status.KINK, f"{what}, so that no vibration is", self.rest.state)
+        return kept
+
     def _mesh(self) -> Mesh:
         named = self.settings.element or any(member.element for member in self.scene.members.values())
         mesh = self.meshing.target
         if self.rest is not None:
-            mesh = replace(mesh, cuts=self.rest.model.mesh.cuts, stops=self.rest.model.mesh.stops)
+            cuts = self.rest.model.mesh.cuts if self.kept is None else self.kept.cuts()
+            mesh = replace(mesh, cuts=cuts, stops=self.rest.model.mesh.stops)
         return replace(mesh, order=mesh.order if named else ORDER, places=True)
 
     def modes(self) -> Modes:
@@ -333,9 +360,11 @@ class ModalAnalysis:
         fixed, mesh = self.meshing.fixed, self._mesh()
         flexible = [name for name, member in self.scene.members.items() if member.type == "flexible"]
         answer, error = self._found(mesh), np.inf
-        found = answer[1]
+        mesh, found = answer[0].model.mesh, answer[1]
         for _ in range(HALVINGS):
             marks = {name: np.full(len(cuts) - 1, name not in fixed) for name, cuts in mesh.cuts.items()}
+            if self.kept is not None:
+                marks = {name: marks[name] & ~resting for name, resting in self.kept.resting(mesh).items()}
             # Where all is prescribed the error is that beside a mesh which only estimates it.
             prescribed = fixed.issuperset(flexible)
             finer = mesh.refined(None if prescribed else marks)
@@ -347,14 +376,14 @@ class ModalAnalysis:
             # What gets no nearer is rounding: the coarser mesh has less of it.
             if prescribed or error > last:
                 break
-            mesh, found, answer = finer, other[1], other
+            mesh, found, answer = other[0].model.mesh, other[1], other
             if error <= self.accuracy or 2 * mesh.elements > MOST_ELEMENTS:
                 break
         self.seconds["solve"] += time.perf_counter() - begin
         return self._answered(*answer, error)
 
     def _found(self, mesh: Mesh) -> tuple[SmallMotion, Eigenmotions]:
-        rest = put_on(self.scene, mesh, self.rest)
+        rest = self._put_on(mesh)
         motion = SmallMotion(rest)
         negative = 0 if self.rest is None else self.rest.certificate.negative
         try:
@@ -364,10 +393,20 @@ class ModalAnalysis:
         except np.linalg.LinAlgError as error:
             raise SolveError(Status.FAILED, f"the frequencies could not be found: {error}", rest.state) from None
 
+    def _put_on(self, mesh: Mesh) -> Solved:
+        """The equilibrium on a mesh, in which elements end where lines do."""
+        rest = put_on(self.scene, mesh, self.rest, self.kept)
+        for _ in range(ENDS):
+            moved = None if self.kept is None else self.kept.with_moved_ends(rest)
+            if moved is None:
+                break
+            rest = put_on(self.scene, moved, self.rest, self.kept)
+        return rest
+
     def _buckling(self, prepared: Prepared) -> Array:
         """Buckling factors, none where the structure cannot be unloaded."""
-        # Without its loads other strings may be slack.
-        if self.rest is None or not prepared.model.conservative or self.scene.stopped:
+        # Without its loads other strings may be slack, and other places touch.
+        if self.rest is None or not prepared.model.conservative or self.scene.stopped or self.scene.contacts:
             return np.zeros(0)
         try:
             return buckling_factors(prepared, self.count)
@@ -382,6 +421,9 @@ class ModalAnalysis:
             notes.append(f"{len(found.exponents)} modes found: on this mesh nothing else with mass oscillates")
         if len(found.growing):
             notes.append("the equilibrium is unstable: some motions leave it without oscillating, at the rates listed")
+        if motion.model.mesh.points:
+            names = ", ".join(dict.fromkeys(f"contacts.{point.contact}" for point in motion.model.mesh.points))
+            notes.append(f"vibrations so small that what touches keeps touching, and nothing else begins to: {names}")
         last = self.rest
         if last is None:
             last = _undeformed(motion, bool(found.rigid))
@@ -419,18 +461,28 @@ def prepared_for_motion(scene: Scene, mesh: Mesh) -> Prepared:
     return Prepared(assemble(scene, replace(mesh, places=True), assembly="nodal"))
 
 
-def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> Solved:
+def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None, kept: Kept | None = None) -> Solved:
     """An equilibrium, or the undeformed scene (None), transferred to a mesh for masses and corrected there.
+
+    Parameters
+    ----------
+    scene : Scene
+    mesh : Mesh
+    rest : Equilibrium or None
+    kept : Kept, optional
+        What touches at the equilibrium.
 
     Raises
     ------
     SolveError
         Newton's method does not converge there.
     """
-    prepared = prepared_for_motion(scene, mesh)
+    prepared = prepared_for_motion(scene, mesh if kept is None else replace(mesh, points=kept.points(mesh)))
     loading = prepared.model.loading(1.0 if rest is None else rest.factor)
     state = prepared.equations.start(loading)
-    if rest is not None:
+    if kept is not None:
+        state = kept.start(prepared)
+    elif rest is not None:
         state = carried(prepared.equations, transferred(rest.model, rest.state, prepared.model), loading)
     found = prepared.correct(state, loading, iterations=30)
     if not found.converged and not found.residual <= tolerances.BALANCED:

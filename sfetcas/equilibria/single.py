@@ -15,7 +15,7 @@ from ..solvers.prepared import Prepared, Solved
 from ..solvers.stability import Stability
 from .solution import Equilibrium, equilibrium
 
-__all__ = ["SolverName", "cold", "finished", "solve_model", "unjudged"]
+__all__ = ["SolverName", "cold", "finished", "solve_model", "solved_from", "unjudged"]
 
 SolverName = Literal["ipopt", "newton"]
 """What finds an equilibrium that none near is known of."""
@@ -98,6 +98,12 @@ UNJUDGED = Stability("not defined", 0, np.nan, np.zeros(0), np.zeros(0))
 def unjudged(found: Solved) -> Equilibrium:
     """What was solved as an :class:`~sfetcas.Equilibrium` without a stability test."""
     return finished(found, UNJUDGED)
+
+
+def solved_from(found: Equilibrium) -> Solved:
+    """An answer as it was solved, on its own mesh."""
+    own = Prepared(found.model)
+    return Solved(own, found.state, found.loading, own.equations.at(found.state, found.loading), 0.0)
 
 
 HIDDEN = (

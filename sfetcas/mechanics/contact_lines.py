@@ -28,10 +28,10 @@ from ..mathematics.arrays import Array, numbers
 from .elements import Element
 from .mesh import ContactPoint
 from .parts import Parts
-from .segments import beside_line, place_of_cut, weights_towards
+from .segments import beside_line, place_of_cut, standing, weights_towards
 from .terms import One, Side, Term
 
-__all__ = ["Carrier", "Mean", "Pressed", "carrier_of", "pressed_along"]
+__all__ = ["Carrier", "Mean", "Pressed", "Tangential", "carrier_of", "pressed_along", "tangential_at"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,6 +211,86 @@ class Pressed(Term):
         if self.carried:
             told = [ca.vertcat(*self.forth(q[-1], ca.vertsplit(force))) for force in told]
         return [part for force in told for part in (*ca.vertsplit(force), *[ca.SX(0)] * (3 - n))]
+
+
+@final
+@dataclass(frozen=True)
+class Tangential(Term):
+    """Constraint: where elements end at a point of contact the member is tangential to the obstacle.
+
+    Places: the strains of the element, the vector of the point.  The rotation of the node that carries the obstacle is
+    the last.  Data: tangents and compliances of the points of the element, the length of the tangent, and what the gap
+    is measured by.
+
+    Attributes
+    ----------
+    element : Element
+    gap : Term
+        The gap, see :class:`~sfetcas.mechanics.contact_points.Gap`.
+    last : bool
+        Whether the element ends there; else it begins there.
+    """
+
+    element: Element
+    gap: Term
+    last: bool
+
+    table: ClassVar[str] = "contacts"
+    along_element: ClassVar[bool] = True
+
+    @property
+    def one_sided(self) -> bool:  # type: ignore[override]
+        """Whether it turns the node that carries the obstacle."""
+        return bool(self.gap.sizes[0])
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """The rotations of the element, its places; one row."""
+        turns, strains, *_ = self.element.sizes
+        return turns + self.gap.sizes[0], strains + 1, 1, self.element.line_data + 1 + self.gap.sizes[3], 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Sine of the angle between the member and the obstacle."""
+        turns, strains, *_ = self.element.sizes
+        line, length, rest = ca.vertsplit(data, [0, self.element.line_data, self.element.line_data + 1, data.shape[0]])
+        tangent = self.element.tangents(q[:turns], u[:strains], line)[-1 if self.last else 0] / length
+        # By how much the gap changes where its vector does along the member.
+        moved = ca.SX.sym("moved", self.axes)
+        (gap,) = self.gap.residual(q[turns:], [ca.vertsplit(moved)], rest, load)
+        there = ca.substitute(ca.gradient(gap, moved), moved, ca.vertcat(*u[strains]))
+        return [ca.dot(there, tangent)]
+
+
+def tangential_at(parts: Parts, point: ContactPoint, gap: Term, data: Array, carrier: Carrier) -> One:
+    """The term of a point at which elements of a member end.
+
+    Parameters
+    ----------
+    parts : Parts
+    point : ContactPoint
+    gap : Term
+        How its gap is measured, with its data.
+    data : ndarray
+        These.
+    carrier : Carrier
+        What carries the obstacle.
+    """
+    member, cut = point.members[0], standing(parts.mesh, point, 0)
+    assert cut is not None
+    number = parts.beams.first[member] + max(cut - 1, 0)
+    tangents = parts.beams.tangent[number]
+    length = np.linalg.norm(tangents[-1 if cut else 0])
+    own = [tangents.ravel(), parts.beams.compliance[number].ravel(), np.array([length]), data]
+    return One(
+        Tangential(parts.element.space, parts.element, gap, cut > 0),
+        point.name,
+        carrier.node,
+        numbers(np.concatenate(own)),
+        (*parts.rotations.turns[number].tolist(), *carrier.turns),
+        (*parts.segments.strains[number].tolist(), parts.segments.place(point.between)),
+        f"{point.name}, tangent",
+        element=number,
+    )
 
 
 def pressed_along(

@@ -49,7 +49,7 @@ import numpy as np
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, numbers
 from .beams import load_size
-from .contact_lines import Carrier, carrier_of, pressed_along
+from .contact_lines import Carrier, carrier_of, pressed_along, tangential_at
 from .mesh import ContactPoint
 from .parts import Parts
 from .rings import GuidedTerm, guided
@@ -334,6 +334,8 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
             yield One(gap, point.name, "", np.concatenate([other, data]), (), place, row)
         data = np.concatenate([*(way[:axes] for way in ways), data])
         yield _held(parts, point, gap, data, begin, slides)
+        if point.tangent:
+            yield tangential_at(parts, point, gap, data, carrier)
 
 
 def _of_line(parts: Parts, point: ContactPoint) -> Iterator[One]:

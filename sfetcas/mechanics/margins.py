@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from .fields import Fields
 from .unilateral import Unilateral, unilaterals
 
-__all__ = ["ROUNDING", "margins", "undecided"]
+__all__ = ["ROUNDING", "UNDECIDED", "margins", "undecided"]
 
 ROUNDING = 1e-12
 """Of margins: what has next to nothing to do stays as it is."""

@@ -163,6 +163,8 @@ class ContactPoint:
         Whether it does so on the element before it, and on the one beyond.
     edge : float
         On an edge 1 or -1, the sign of (edge x tangent) on the side where its member is; else zero.
+    tangent : bool
+        Whether the member also stays tangential to the obstacle there, as where a line ends; elements do so, too.
     """
 
     contact: str
@@ -177,6 +179,7 @@ class ContactPoint:
     line: bool = False
     sides: tuple[bool, bool] = (True, True)
     edge: float = 0.0
+    tangent: bool = False
 
     @property
     def name(self) -> str:
@@ -205,6 +208,7 @@ class ContactPoint:
         """
         gap, count = [] if self.grip else [f"{self.name}, gap"], self.components(axes)
         gap = [f"{self.name}, beside", *gap] if self.met else gap
+        gap += [f"{self.name}, tangent"] if self.tangent else []
         return [*([f"{self.name}, {i + 1} of {count}" for i in range(count)] if count > 1 else [self.name]), *gap]
 
     def components(self, axes: int) -> int:
