@@ -239,9 +239,13 @@ def test_expressions_say_what_answers_say():
     ringed = beam({**square, "stretch": True}, loads=force).to_dict()
     ringed |= {"rings": {"r": {"node": "R", "member": "m", "at": 0.5, "travel": -0.01}}}
     ringed = Scene.from_dict({**ringed, "nodes": {**ringed["nodes"], "R": eyelet}})
+    drum = {"type": "circle", "center": [0.35, -0.3], "radius": 0.25, "members": "all"}
+    pressed = beam(
+        {"EI3": 1.0}, "plane", loads={"f": {"type": "force", "node": "B", "value": [0, -2]}}, contacts={"c": drum}
+    )
     met = set()
     yielding = beam({**square, "stretch": True, "shear": True}, loads=force)
-    for scene in (frame(), rod, yielding, driven("plane"), driven("space"), sheath, ringed):
+    for scene in (frame(), rod, yielding, driven("plane"), driven("space"), sheath, ringed, pressed):
         names = []
         for kind in (kind for kind in ANSWERS if {"statics", "parameters"} <= set(kind.where)):
             table = {"reactions": "nodes"}.get(kind.table, kind.table)

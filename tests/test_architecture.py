@@ -256,6 +256,7 @@ ORDER = [
     "parametric.equilibrium",
     "parametric.implicit",
     "parametric.choosing",
+    "parametric.touching",
     "parametric.solving",
     "parametric.fitting",
     "parametric.moving",

@@ -39,6 +39,9 @@ may be off: rounding leaves less.
 SLIVER = 1e-6
 """Fraction of a length below which an element is a sliver, which gains nothing and leaves rounding."""
 
+LASTING = 1e-10
+"""Pull, dimensionless, that is rounding."""
+
 LINES, IDLE = 1e-3, 0.1
 """Share of what is little at a place that is so of one of many along a line, and share of a line on which nothing
 presses: less may be that of elements near its ends, where a force presses.
@@ -76,7 +79,8 @@ class Kept:
         run.lines.keys = frozenset(point.pair for point in points if _on_line(point))
         # Where members roll over nodes they slide.
         rolling = points_of(run.rolling(rest, lambda model: model.loading(rest.factor)))
-        self.single = tuple(_firm(point) for point in rolling if point.pair not in run.lines.keys)
+        single = (_firm(point) for point in rolling if point.pair not in run.lines.keys)
+        self.single = tuple(sorted(single, key=lambda point: (point.contact, point.members, point.at)))
         self.stretches = run.lines.stretches(rest)
 
     # -- on another mesh --------------------------------------------------------------------------
@@ -195,13 +199,25 @@ class Kept:
             if not self._known(near):
                 yield f"{_where(near)} without a force"
 
-    def lines(self) -> Iterator[str]:
-        """Lines that are not kept, as sentences."""
+    def changed(self) -> Iterator[str]:
+        """What touches otherwise than the points say, as sentences; none where they are those of an equilibrium."""
+        fields = self.rest.fields
+        for point, begun in zip(points_of(self.rest), self.rest.model.mesh.points, strict=True):
+            if fields.contact_point(begun)["push"] < -LASTING * self.rest.model.scales.force:
+                yield f"contacts.{point.contact} leaves {_places(point)}"
+            elif any(not -SLIVER <= x <= 1.0 + SLIVER for x in point.at):
+                yield f"contacts.{point.contact} slides off {_places(point)}"
+        for near in self.closest.found(fields, 0.0):
+            if near.gap < -self.run.tolerance and not self._known(near):
+                yield _where(near)
+
+    def lines(self, *, smooth: bool = False) -> Iterator[str]:
+        """Lines that are not kept, as sentences; with ``smooth`` also those that are, on obstacles without friction."""
         for contact, members in sorted(self.run.lines.keys):
             if len(members) > 1:
                 yield f"members {' and '.join(map(repr, members))} lie along each other (contacts.{contact})"
-            elif self.scene.rubs:
-                yield f"member {members[0]!r} lies along contacts.{contact} beside friction"
+            elif self.scene.rubs or smooth:
+                yield f"member {members[0]!r} lies along contacts.{contact}{' beside friction' * self.scene.rubs}"
 
     def _flattens(self, point: ContactPoint) -> bool:
         """Whether a point is where the gap does not grow beside it, of what may bend."""
@@ -249,8 +265,12 @@ def _firm(point: ContactPoint) -> ContactPoint:
 
 def _where(one: ContactPoint | Near) -> str:
     """``contacts.peg touches beam at 0.5``."""
-    places = [f"{member} at {x:.4g}" for member, x in zip(one.members, one.at, strict=True)]
-    return f"contacts.{one.contact} touches {' and '.join(places)}"
+    return f"contacts.{one.contact} touches {_places(one)}"
+
+
+def _places(one: ContactPoint | Near) -> str:
+    """``beam at 0.5``."""
+    return " and ".join(f"{member} at {x:.4g}" for member, x in zip(one.members, one.at, strict=True))
 
 
 def _on_line(point: ContactPoint) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from ..errors import SceneError
+from ..mathematics.arrays import numbers, values_of
 from .records import Direction, Positive, Record, Vector, listed, number, say
 from .sections import CrossSection
 from .structure import Member
@@ -140,8 +141,8 @@ def contact_radius(contact: Contact, member: Member, sections: Mapping[str, Cros
     if section is None or section.shape not in ("circle", "tube"):
         return None
     x = np.linspace(0.0, 1.0, 5)
-    outermost = section.fibres(x)[:, 1]
-    return float(outermost[0]) if np.ptp(outermost) == 0.0 else None
+    outermost = numbers(section.fibres(x))[:, 1]
+    return outermost[0] if np.ptp(values_of(outermost)) == 0.0 else None
 
 
 def pairs_of(names: Iterable[str], members: Mapping[str, Member]) -> list[tuple[str, str]]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import tolerances
 from ..errors import SceneError
-from ..mathematics.arrays import TINY, Array, unit
+from ..mathematics.arrays import TINY, Array, numbers, unit
 from .contacts import Contact
 from .loads import Motion
 from .structure import Node
@@ -107,18 +107,19 @@ def obstacle(contact: Contact, space: bool) -> Obstacle:
         side = None if contact.side is None else np.asarray(contact.side, dtype=float)
         normal = unit(contact.normal) if contact.type == "plane" else np.cross([0, 0, 1.0], unit(contact.direction))
         normal = -normal if side is not None and side @ normal < 0.0 else normal
-        return Obstacle("flat", np.asarray(contact.point), np.outer(normal, normal), normal, carrier=contact.node)
+        return Obstacle("flat", numbers(contact.point), np.outer(normal, normal), normal, carrier=contact.node)
     if contact.type in ("point", "line"):
         point = contact.position if contact.type == "point" else contact.point
         edge = eye[2] if contact.type == "point" else unit(contact.direction)
         side = np.asarray(contact.side, dtype=float)
         kind: Literal["round", "sharp"] = "round" if contact.member_radius > 0.0 else "sharp"
-        return Obstacle(kind, np.asarray(point, dtype=float), eye - np.outer(edge, edge), edge, side=side)
+        return Obstacle(kind, numbers(point), eye - np.outer(edge, edge), edge, side=side)
     axis = unit(contact.axis)
     across = eye if contact.type == "sphere" else eye - np.outer(axis, axis)
     sign = -1.0 if contact.side == "inside" else 1.0
-    place = np.asarray(contact.center, dtype=float)
-    return Obstacle("round", place, across, np.zeros(3), float(contact.radius or 0.0), sign, carrier=contact.node)
+    return Obstacle(
+        "round", numbers(contact.center), across, np.zeros(3), contact.radius or 0.0, sign, carrier=contact.node
+    )
 
 
 def carriers(contacts: Mapping[str, Contact]) -> frozenset[str]:

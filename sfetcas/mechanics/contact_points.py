@@ -41,13 +41,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import casadi as ca
 import numpy as np
 
+from ..description.contacts import contact_radius
 from ..description.scene import Scene
-from ..mathematics.arrays import Array, numbers
+from ..mathematics.arrays import Array, numbers, unit
 from .beams import load_size
 from .contact_lines import Carrier, carrier_of, pressed_along, tangential_at
 from .mesh import ContactPoint
@@ -298,8 +299,17 @@ def undeformed_vectors(scene: Scene, points: Sequence[ContactPoint]) -> list[Arr
     vectors = []
     for point in points:
         ends = [places[each] for each in zip(point.members, point.at, strict=True)]
-        vectors.append(np.asarray(ends[0] - (ends[1] if len(ends) == 2 else scene.obstacles[point.contact].place)))
+        vectors.append(numbers(ends[0] - (ends[1] if len(ends) == 2 else scene.obstacles[point.contact].place)))
     return vectors
+
+
+def _distance(scene: Scene, point: ContactPoint) -> Any:
+    """The distance of a point as the scene says it, m: its radii may depend on parameters."""
+    contact = scene.contacts[point.contact]
+    if contact.between_members:
+        return sum(contact_radius(contact, scene.members[member], scene.sections) or 0.0 for member in point.members)
+    stop = scene.obstacles[point.contact]
+    return contact.member_radius + stop.sign * stop.radius
 
 
 def contact_points_in(parts: Parts) -> Iterator[One]:
@@ -326,13 +336,13 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
                 continue
             yield from guided(parts, Meeting, (point.name,) * 2, (member, point.at[side]), slides[side], side == 1)
         gap, ways = _gap(parts.scene, point, space)
-        data = np.append(begin[:axes], point.distance) / unit
+        data = np.concatenate([begin[:axes], numbers([_distance(parts.scene, point)])]) / unit
         if point.met:
             # Where the edge is, both ways across it.
             other = np.cross(parts.scene.obstacles[point.contact].normal, ways[0])[:axes]
             place, row = (between,), f"{point.name}, beside"
-            yield One(gap, point.name, "", np.concatenate([other, data]), (), place, row)
-        data = np.concatenate([*(way[:axes] for way in ways), data])
+            yield One(gap, point.name, "", numbers(np.concatenate([other, data])), (), place, row)
+        data = numbers(np.concatenate([*(way[:axes] for way in ways), data]))
         yield _held(parts, point, gap, data, begin, slides)
         if point.tangent:
             yield tangential_at(parts, point, gap, data, carrier)
@@ -373,12 +383,16 @@ def _held(parts: Parts, point: ContactPoint, gap: Gap, data: Array, begin: Array
 
 def _gap(scene: Scene, point: ContactPoint, space: bool) -> tuple[Gap, list[Array]]:
     """The constraint of a point, and the directions that belong to its data."""
-    carried = scene.contacts[point.contact].node is not None
-    if point.normal is not None:
-        return Gap(space, True, carried=carried), [np.array(point.normal)]
+    contact = scene.contacts[point.contact]
+    carried = contact.node is not None
     if len(point.members) == 2:
-        return Gap(space, False), []
+        directed = point.normal is not None
+        return Gap(space, directed), [np.array(point.normal)] if directed else []
     stop = scene.obstacles[point.contact]
-    axis = np.linalg.svd(stop.across)[2][2]
-    across = space and float(np.trace(stop.across)) < 2.5
+    if point.normal is not None:
+        # That of a plane may depend on parameters.
+        return Gap(space, True, carried=carried), [stop.normal if stop.kind == "flat" else np.array(point.normal)]
+    across = space and contact.type != "sphere"
+    # An edge has its direction for a normal.
+    axis = unit(contact.axis) if contact.type in ("circle", "cylinder") else stop.normal
     return Gap(space, False, across, stop.sign < 0.0, carried), [axis] if across else []

@@ -390,6 +390,12 @@ class Mesh:
         return shown(self, [f"order={self.order}", counted(self.elements, "element")], cuts)
 
     @property
+    def sliding(self) -> int:
+        """Number of places that slide along what they touch, in which the Lagrangian is largest, not least."""
+        # On an edge the place is given by where the edge is.
+        return sum(sum(point.slides) for point in self.points if not point.edge)
+
+    @property
     def elements(self) -> int:
         """Number of elements of all members."""
         return sum(len(cuts) - 1 for cuts in self.cuts.values())

@@ -228,6 +228,11 @@ class Model:
         turning = self.space and any(group.moment.any() for group in self.groups.values())
         return self.has_potential and not turning
 
+    @property
+    def downhill(self) -> bool:
+        """Whether equilibria are found downhill from the undeformed state: not where something touches."""
+        return self.minimisable and not self.mesh.points
+
     def check_complete(self) -> None:
         """Refuse a model whose scene has conditions that the model does not contain.
 

@@ -411,6 +411,9 @@ VECTORS = (
     "anchor",
     "moment",
     "moment_density",
+    "center",
+    "point",
+    "normal",
 )
 """Keys of vectors."""
 
@@ -441,6 +444,10 @@ UNITS = {
     "moment": "A m2",
     "moment_density": "A m",
     "gradient": "T/m",
+    "center": "m",
+    "point": "m",
+    "radius": "m",
+    "member_radius": "m",
 }
 """Units of numbers by their keys."""
 
@@ -485,7 +492,7 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
 def _meaning(path: Sequence[str]) -> str:
     kinds = {"loads": "load", "motions": "motion", "sections": "section", "nodes": "node", "springs": "spring"}
     kinds |= {"tendons": "tendon", "tubes": "tube", "rings": "ring", "actuations": "actuation", "fields": "field"}
-    kinds["magnets"] = "magnet"
+    kinds |= {"magnets": "magnet", "contacts": "contact"}
     if len(path) < 2:
         return path[0]
     return f"{'.'.join(path[2:])} of the {kinds.get(path[0], path[0])} {path[1]}"

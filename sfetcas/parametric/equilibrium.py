@@ -10,24 +10,37 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ..contact.kept import Kept
 from ..description.scene import Scene, check_scene
 from ..description.showing import shown
 from ..equilibria.settings import Settings
+from ..equilibria.single import solved_from
 from ..equilibria.solution import Equilibrium
 from ..equilibria.statics import solve
 from ..equilibria.stops import solve_stopped
 from ..errors import SceneError, SolveError
 from ..mathematics.arrays import Array
 from ..mechanics.accuracy import every_other
+from ..mechanics.contact_points import undeformed_vectors
 from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
 from ..solvers.globalised import Code, Globalised, Outcome, Rules
-from ..solvers.prepared import Prepared
+from ..solvers.prepared import Prepared, Solved
 from .arguments import Arguments, Asked, asked_for, in_words
 from .results import Results, default_results
 
-__all__ = ["EquilibriumSolver", "Place", "asked_mesh", "chosen_places", "equilibrium_solver", "refuse_search"]
+__all__ = [
+    "EquilibriumSolver",
+    "Place",
+    "asked_mesh",
+    "chosen_places",
+    "equilibrium_solver",
+    "in_contact",
+    "kept_of",
+    "refuse_search",
+    "touching_mesh",
+]
 
 Place = Mapping[str, Sequence[float]]
 """Fractions of the length of members."""
@@ -165,6 +178,7 @@ def equilibrium_solver(
     places: Place | None = None,
     settings: Settings | None = None,
     stopped: bool = False,
+    touching: bool = False,
 ) -> EquilibriumSolver:
     """The solver of a scene, on the mesh that its accuracy asks for.
 
@@ -178,6 +192,7 @@ def equilibrium_solver(
     places : fractions of the length at which results along members are given
     settings : as of :func:`~sfetcas.equilibria.statics.solve`
     stopped : whether it is for what is taut and at a stop in the answer of statics only; else such scenes are refused
+    touching : whether it is for what touches in the answer of statics only; else such scenes are refused
 
     Raises
     ------
@@ -185,7 +200,7 @@ def equilibrium_solver(
         A scene that cannot be exported, a number or a result that it does not have.
     """
     check_scene(scene, "export({}, ...)", steps=False)
-    refuse_search(scene, stopped=stopped)
+    refuse_search(scene, stopped=stopped, touching=touching)
     if scene.analysis.type == "modes":
         message = "found 'modes', accepted: static or path, whose equilibria are exported, or dynamic"
         raise SceneError(message, ("analysis", "type"))
@@ -196,6 +211,7 @@ def equilibrium_solver(
     unique = not any(note.startswith(NOT_UNIQUE) for note in answer.notes)
     names = results or default_results(base, unique=unique)
     outputs = Results(base, names, chosen_places(members, places or {}), unique=unique)
+    outputs.refuse_places()
     known = Arguments(scene, base, asked_for(scene, arguments), outputs, f"{name}_", needed=not stopped)
     start = None
     if prepared.lacks_slack or any(node.start is not None for node in scene.nodes.values()):
@@ -203,6 +219,9 @@ def equilibrium_solver(
         start = known.program.flat(prepared.guess(base.loading(scene.analysis.steps[-1]))[0])
     rules = Rules() if scene.analysis.unstable == "leave" else replace(Rules(), escapes=0)
     solver = EquilibriumSolver(name, scene, known, outputs, rules, start, answer)
+    if mesh.points:
+        # What touches does so near its answer alone.
+        return replace(solver, start=in_contact(kept_of(scene, settings or Settings(), solved_from(answer)), solver))
     return solver if start is not None or _same(solver) else replace(solver, start=_answered(solver))
 
 
@@ -227,10 +246,12 @@ NOT_UNIQUE = "reactions are not unique"
 """How a note of statics begins where closings depend on each other."""
 
 
-def refuse_search(scene: Scene, lacking: str = "not exported", *, stopped: bool = False) -> None:
+def refuse_search(
+    scene: Scene, lacking: str = "not exported", *, stopped: bool = False, touching: bool = False
+) -> None:
     """Refuse a scene whose equilibrium needs a search (contacts, stops, ...), which is not exported, or is ``lacking``.
 
-    With ``stopped`` what is taut and at a stop may have to be found.
+    With ``stopped`` what is taut and at a stop may have to be found, with ``touching`` what touches.
 
     Raises
     ------
@@ -238,8 +259,15 @@ def refuse_search(scene: Scene, lacking: str = "not exported", *, stopped: bool 
         Names it, and what is possible instead.
     """
     instead = "accepted: the scene without"
-    if scene.contacts:
+    if scene.contacts and not touching:
         raise SceneError(f"contact is found by a search that is {lacking}, {instead}", ("contacts",))
+    for name, contact in scene.contacts.items():
+        if contact.friction > 0.0:
+            message = f"what sticks and slides depends on the steps before, and is {lacking}, accepted: 0"
+            raise SceneError(message, ("contacts", name, "friction"))
+        if scene.stopped:
+            message = f"what touches beside stops or tendons that may be slack is {lacking}, accepted: one of these"
+            raise SceneError(message, ("contacts", name))
     for name, spring in scene.springs.items():
         if spring.stop is not None and not stopped:
             message = f"which stops act is found by a search that is {lacking}, {instead}"
@@ -267,6 +295,8 @@ def asked_mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium
         solution = (solve_stopped if still.stopped else solve)(still, settings)
     except SolveError as error:
         raise SceneError(f"the scene itself has no equilibrium: {error}, accepted: one that has") from None
+    if scene.contacts:
+        return touching_mesh(still, settings, solution.last), solution.last.model.assembly, solution.last
     model = max((step.model for step in solution.steps), key=lambda one: one.mesh.elements)
     asked = [settings.elements or member.elements for member in scene.members.values() if member.type == "flexible"]
     # Tendons with friction are pulled or let out as at the first step.
@@ -278,6 +308,53 @@ def asked_mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium
         flexible = [n for n, member in scene.members.items() if member.type == "flexible"]
         mesh = replace(mesh, cuts={n: every_other(c) if n in flexible else c for n, c in mesh.cuts.items()})
     return mesh, model.assembly, solution.last
+
+
+def touching_mesh(scene: Scene, settings: Settings, answer: Equilibrium) -> Mesh:
+    """The mesh of an answer of statics with what touches where it does, also where places roll over nodes.
+
+    Raises
+    ------
+    SceneError
+        Members lie along something.
+    """
+    kept = kept_of(scene, settings, solved_from(answer))
+    for what in kept.lines(smooth=True):
+        raise SceneError(f"{what}, accepted: members that touch at places", ("contacts",))
+    mesh = replace(answer.model.mesh, cuts=kept.cuts())
+    return replace(mesh, points=kept.points(mesh))
+
+
+def kept_of(scene: Scene, settings: Settings, found: Solved) -> Kept:
+    """What touches in a state of a scene."""
+    model = found.model
+
+    def prepare(mesh: Mesh) -> Prepared:
+        return Prepared(assemble(scene, mesh, assembly=model.assembly, scales=model.scales))  # type: ignore[arg-type]
+
+    return Kept(scene, prepare, settings.accuracy or scene.analysis.accuracy, (), found)
+
+
+def in_contact(kept: Kept, solver: EquilibriumSolver) -> Array:
+    """An answer of statics in contact as a state (states,) of a solver in which the same touches.
+
+    Places begin elsewhere along their members there, and units may be others.
+    """
+    scene, mesh = kept.scene, solver.model.mesh
+    points = kept.points(mesh)
+    state = kept.start(kept.run.prepare(replace(mesh, points=points)))
+    y, number = state.y.copy(), {name: i for i, name in enumerate(solver.model.positions.unknowns)}
+    unit, target = kept.rest.model.scales, solver.model.scales
+    begins = zip(undeformed_vectors(scene, points), undeformed_vectors(scene, mesh.points), strict=True)
+    for now, point, (here, there) in zip(points, mesh.points, begins, strict=True):
+        for side, member in enumerate(point.members):
+            if point.slides[side]:
+                moved = (now.at[side] - point.at[side]) * scene.center_lines[member].length
+                y[number[f"{point.place(side)}, arc length"]] += moved / unit.length
+        for k in range(solver.model.element.axes):
+            y[number[f"{point.between}, {'xyz'[k]}"]] += (here - there)[k] / unit.length
+    state = replace(state, y=y * unit.length / target.length, lam=state.lam * unit.force / target.force)
+    return solver.arguments.program.flat(state)
 
 
 def chosen_places(members: Sequence[str], given: Place) -> dict[str, tuple[float, ...]]:

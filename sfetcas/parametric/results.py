@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import tolerances
 from ..description.answers import PARAMETERS, STEPS, AnswerName, answer_name, check_answer, single_number
-from ..description.records import unknown
+from ..description.records import counted, unknown
 from ..description.tendons import Stretch
 from ..errors import SceneError
 from ..mathematics import quaternion
@@ -25,9 +25,11 @@ from ..mechanics.connections import connections_of
 from ..mechanics.laws import bent_by, law_data, law_of
 from ..mechanics.load_terms import spread_of
 from ..mechanics.magnetism import magnet_terms
+from ..mechanics.mesh import ContactPoint
 from ..mechanics.model import Model
 from ..mechanics.reactions import Reactions
 from ..mechanics.rings import up_to
+from ..mechanics.segments import standing
 from ..mechanics.singles import fibre_strain, spin_of, turned_vector
 from ..mechanics.stationarity import Stationarity
 from ..mechanics.stations import Stations
@@ -96,6 +98,7 @@ def default_results(model: Model, *, unique: bool = True) -> list[str]:
         names += [f"tendons.{name}.{field}" for field in ("tension", "length", *["far_tension"] * tendon.rubs)]
     names += [f"tubes.{name}.{field}" for name in model.scene.tubes for field in ("torque", "angle")]
     names += [f"rings.{name}.{field}" for name in model.scene.rings for field in ("at", "force")]
+    names += [f"contacts.{name}.force" for name in model.scene.contacts]
     return [*names, "energy.elastic", "energy.potential"]
 
 
@@ -119,6 +122,7 @@ WHOSE = {
     "tendons": "of the tendon",
     "tubes": "of the tube",
     "rings": "of the ring",
+    "contacts": "of the contact",
     "motions": "of the motion",
     "magnets": "of the magnet",
     "energy": "energy",
@@ -250,6 +254,28 @@ class Results:
         """Those whose sections have a law."""
         return [name for name in self.curved if law_of(self.model.scene, name) is not None]
 
+    @property
+    def touching(self) -> list[str]:
+        """Members that touch something, whose lengths say where."""
+        return list(dict.fromkeys(member for point in self.model.mesh.points for member in point.members))
+
+    def refuse_places(self) -> None:
+        """Refuse to tell where a contact touches that touches at no place, or at several.
+
+        Raises
+        ------
+        SceneError
+            Names the first.
+        """
+        for result in self.results:
+            asked = result.asked
+            count = sum(point.contact == asked.record for point in self.model.mesh.points)
+            if (asked.kind.table, asked.kind.key) == ("contacts", "at") and count != 1:
+                message = (
+                    f"found contacts.{asked.record}, which touches at {counted(count, 'place')}, accepted: one that"
+                )
+                raise SceneError(f"{message} touches at one, or contacts.{asked.record}.force", ("results",))
+
     def refuse_along(self, members: Iterable[str]) -> None:
         """Refuse results along members whose elements move with a parameter, and with them the places within elements.
 
@@ -267,13 +293,16 @@ class Results:
                 raise SceneError(message, ("results",))
 
     def rest(self, model: Model) -> Array:
-        """Undeformed positions (m) of nodes and places along members, then section data for strains; flat."""
+        """Undeformed positions (m) of nodes and places along members, then section data for strains, then lengths (m);
+        flat.
+        """
         scene = model.scene
         nodes = [numbers(scene.nodes[name].position) for name in model.nodes]
         along = [scene.center_lines[name].positions(np.array(x)) for name, x in self.every.items()]
         sections = [self._sections(model, name).ravel() for name in self.curved]
         sections += [self.strung_data(model, name).ravel() for name in self.strung]
         sections += [law_data(scene, name, np.array(self.every[name])).ravel() for name in self.lawful]
+        sections += [numbers([scene.center_lines[name].length]) for name in self.touching]
         return np.concatenate([*nodes, *(part.ravel() for part in along), *sections])
 
     def strung_data(self, model: Model, member: str) -> Array:
@@ -375,7 +404,10 @@ class _Outputs:
         strung = [results.strung_data(model, name).shape for name in results.strung]
         lawful = [law_data(model.scene, name, np.array(results.every[name])).shape for name in results.lawful]
         tables = [3 * count, *(3 * n for n in along), *curved, *(a * b for a, b in (*strung, *lawful))]
-        nodes, *members = ca.vertsplit(rest, np.cumsum([0, *tables]).tolist())
+        touching = results.touching
+        nodes, *members = ca.vertsplit(rest, np.cumsum([0, *tables, *(1 for _ in touching)]).tolist())
+        members, lengths = members[: len(tables) - 1], members[len(tables) - 1 :]
+        self._lengths = dict(zip(touching, lengths, strict=True))
         sections = members[len(along) : len(along) + len(curved)]
         pairs = zip((*strung, *lawful), members[len(along) + len(curved) :], strict=True)
         others = [ca.reshape(x, shape[1], shape[0]) for shape, x in pairs]
@@ -423,6 +455,8 @@ class _Outputs:
             return self._tube(record, key)
         if kind.table == "rings":
             return self._ring(record, key)
+        if kind.table == "contacts":
+            return self._contact(record, key)
         tables = {"nodes": self._node, "reactions": self._reaction, "members": self._member, "motions": self._motion}
         return tables[kind.table](record, key)
 
@@ -713,13 +747,21 @@ class _Outputs:
         return self._about(gained + ca.horzcat(ca.MX(expressions.turns, 0), *self._pushed(member)[1]))
 
     def _pushed(self, member: str) -> tuple[list[ca.MX], list[ca.MX]]:
-        """Of each place of a member what rings that are before it in its element add to force and moment there."""
+        """Of each place of a member what rings, and what touches it, before it in its element add to force and moment
+        there.
+        """
         model, at, expressions = self._model, self._stations(member), self._expressions
         cuts, n, begin = model.mesh.cuts[member], expressions.points, model.elements_of(member).start
         forces = [ca.MX.zeros(expressions.axes) for _ in at.elements]
         moments = [ca.MX.zeros(expressions.turns) for _ in at.elements]
-        for name in (name for name, ring in model.scene.rings.items() if ring.member == member):
-            place, push = self._ring(name, "at"), self._ring(name, "force")[: expressions.axes] / model.scales.force
+        rings = [name for name, ring in model.scene.rings.items() if ring.member == member]
+        pushes = [(self._ring(name, "at"), self._ring(name, "force")) for name in rings]
+        sides = [(p, i) for p in model.mesh.points for i, touching in enumerate(p.members) if touching == member]
+        # Where elements end it pushes a place between them.
+        inside = [(p, i) for p, i in sides if standing(model.mesh, p, i) is None]
+        pushes += [(self._place(p, i), (1.0 - 2.0 * i) * self._force_at(p)) for p, i in inside]
+        for place, force in pushes:
+            push = force[: expressions.axes] / model.scales.force
             for i, (element, xi) in enumerate(zip(at.elements.tolist(), at.xi.tolist(), strict=True)):
                 start, end = cuts[element], cuts[element + 1]
                 here = (place - start) / (end - start)
@@ -804,6 +846,22 @@ class _Outputs:
         scene = self._model.scene
         length = scene.center_lines[scene.rings[name].member].length
         return scene.ring_places[name] + self._connection("rings", name, "moved") / length
+
+    def _contact(self, name: str, key: str) -> ca.MX:
+        """The resultant of what a contact does, or where it touches at one place alone."""
+        points = [point for point in self._model.mesh.points if point.contact == name]
+        if key == "force":
+            return sum((self._force_at(point).T for point in points), ca.MX.zeros(1, 3))
+        return self._place(points[0], 0) if len(points) == 1 else ca.MX(np.nan)
+
+    def _force_at(self, point: ContactPoint) -> ca.MX:
+        """Force (3,), N, at a place that touches on the first member."""
+        return ca.vertcat(*[self._connection("contacts", point.name, f"force {axis}") for axis in "xyz"])
+
+    def _place(self, point: ContactPoint, side: int) -> ca.MX:
+        """Where a place that touches is on a member, a fraction of its length."""
+        moved = self._connection("contacts", point.name, f"moved on {('first', 'second')[side]}")
+        return point.at[side] + moved / self._lengths[point.members[side]]
 
     # -- stiffness ----------------------------------------------------------------------------------
 

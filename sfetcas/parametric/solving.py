@@ -33,6 +33,7 @@ from .choosing import Choosing
 from .equilibrium import EquilibriumSolver, Place, equilibrium_solver, refuse_search
 from .implicit import Implicit, Slopes
 from .results import Result, Results
+from .touching import Touching
 
 __all__ = ["ParametricAnswer", "ParametricEquilibrium", "Values", "parametric"]
 
@@ -80,7 +81,7 @@ def parametric(
     check_scene(scene, "parametric({}, ...)", steps=False)
     parameters = [parameters] if isinstance(parameters, str) else parameters
     answers = [answers] if isinstance(answers, str) else answers
-    refuse_search(scene, "without derivatives", stopped=True)
+    refuse_search(scene, "without derivatives", stopped=True, touching=True)
     if scene.analysis.type == "modes":
         raise SceneError("found 'modes', accepted: static, or path", ("analysis", "type"))
     try:
@@ -92,6 +93,7 @@ def parametric(
             places=places,
             settings=settings,
             stopped=scene.stopped,
+            touching=bool(scene.contacts),
         )
         choosing = Choosing(solver) if scene.stopped else None
         if choosing is not None:
@@ -102,7 +104,8 @@ def parametric(
         own = [one.name for one in solver.results.results if not one.member]
         solver = solver.with_results(own)
         choosing = None if choosing is None else replace(choosing, first=solver)
-    return ParametricEquilibrium(solver, settings or Settings(), choosing)
+    touching = Touching(solver, settings or Settings()) if scene.contacts else None
+    return ParametricEquilibrium(solver, settings or Settings(), choosing, touching)
 
 
 def _renamed(error: SceneError) -> SceneError:
@@ -125,11 +128,14 @@ class ParametricEquilibrium:
     settings : Settings
     choosing : Choosing or None
         Where strings may be slack and springs have stops: the solvers of other choices of what is taut and at a stop.
+    touching : Touching or None
+        Where something may touch: the solvers of what else touches.
     """
 
     solver: EquilibriumSolver
     settings: Settings
     choosing: Choosing | None = None
+    touching: Touching | None = None
 
     def __repr__(self) -> str:
         solver = self.solver
@@ -206,6 +212,8 @@ class ParametricEquilibrium:
         numbers = self.flat(values)
         if self.choosing is not None:
             return self._chosen(self.choosing, numbers, start)
+        if self.touching is not None:
+            return self._touching(self.touching, numbers, start)
         return self._solved(numbers, start)
 
     def _chosen(self, choosing: Choosing, numbers: Array, start: ParametricAnswer | None) -> ParametricAnswer:
@@ -224,6 +232,27 @@ class ParametricEquilibrium:
 
         first = self if start is None else start.of
         return known[settled(self.solver.scene, answer, first.solver.model.mesh.stops)]
+
+    def _touching(self, touching: Touching, numbers: Array, start: ParametricAnswer | None) -> ParametricAnswer:
+        """The equilibrium in which nothing penetrates or pulls, with what touches in ``start`` if that may be so."""
+        first = self if start is None else start.of
+        try:
+            answer = first._solved(numbers, start)
+        except SolveError:
+            pass
+        else:
+            if not any(touching.kept(first.solver, numbers, answer.outcome.state).changed()):
+                return answer
+        solver, state = touching.anew(numbers)
+        if solver not in touching.equilibria:
+            own = self if solver is self.solver else replace(self, solver=replace(solver, start=state))
+            touching.equilibria[solver] = own
+        of = touching.equilibria[solver]
+        near = ParametricAnswer(of, numbers, Outcome(Code.SOLVED, state, 0.0, 0, 0))
+        answer = of._solved(numbers, near)
+        for what in touching.kept(solver, numbers, answer.outcome.state).changed():
+            raise SolveError(Status.FAILED, f"{what}, where nothing else was found to touch", answer.outcome)
+        return answer
 
     def _in(self, choosing: Choosing, stops: Stops) -> ParametricEquilibrium:
         """The same in a choice; one for each, as it keeps the functions of its derivatives."""
@@ -365,6 +394,8 @@ class ParametricAnswer:
     def _slopes(self) -> Slopes:
         if self.of.choosing is not None:
             self.of.choosing.refuse_doubt(self.of.solver, self.numbers, self.outcome.state)
+        if self.of.touching is not None:
+            self.of.touching.refuse_doubt(self.of.solver, self.numbers, self.outcome.state)
         return self.of.implicit.slopes(self.numbers, self.outcome.state)
 
     @property

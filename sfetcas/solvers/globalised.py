@@ -5,7 +5,8 @@ energy on the closings remains.  Where the energy is not convex on them, which t
 matrix show (Sylvester), positive matrices replace those of the elements, and the diagonal is shifted until the signs
 are right; steps are shortened until potential and gaps fall.  Near the answer steps are taken whole.  Unstable
 equilibria are left along the lowest mode.  Loads without potential, and cases in which no minimum is found, are
-followed from zero loads.  From an equilibrium for other values Newton's whole steps are tried first.
+followed from zero loads.  What touches is no minimum in where it does: there Newton's steps go on from a state given.
+From an equilibrium for other values Newton's whole steps are tried first.
 
 Every operation on numbers is one of the functions of :class:`~sfetcas.solvers.program.Program`; generated C takes the
 same decisions on the same numbers, with the same :class:`Rules`.
@@ -218,6 +219,7 @@ class Globalised:
         # Large vectors stay in CasADi's type between functions: conversion costs more than most of these calls.
         self._made_firm = self._firmness()
         self._symmetric = program.model.has_potential
+        self._sliding, self._followable = program.model.mesh.sliding, not program.model.mesh.points
         if self._symmetric and self._total:
             self._solver = ca.Linsol("globalised", "ldl", program.sparsity)
             self._solver.sfact(ca.DM(program.sparsity, 1.0))
@@ -238,7 +240,7 @@ class Globalised:
     def _factor(self, entries: ca.DM, firm: float) -> int:
         """Factorise a matrix with its diagonal shifted; the number of its negative pivots less that of rows.
 
-        :data:`FAILED` if the factors break down, 0 for unsymmetric matrices.
+        Nor are places that slide counted.  :data:`FAILED` if the factors break down, 0 for unsymmetric matrices.
         """
         self._target, self._matrix = self._made_firm(entries, firm)
         if not self._symmetric or not self._total:
@@ -247,7 +249,7 @@ class Globalised:
             self._solver.nfact(self._matrix)
         except RuntimeError:
             return FAILED
-        return int(self._solver.neig(self._matrix)) - (self._total - self._unknowns)
+        return int(self._solver.neig(self._matrix)) - (self._total - self._unknowns) - self._sliding
 
     def _backward(self, b: Array) -> Array:
         if not self._total:
@@ -329,7 +331,7 @@ class Globalised:
         state = program.begin(whole) if start is None else program.hold(start, whole)
         found = self._near(state, whole) if warm else None
         found = found or self._from(state, whole)
-        if found.code not in (Code.SOLVED, Code.UNSTABLE) and self._left:
+        if found.code not in (Code.SOLVED, Code.UNSTABLE) and self._left and self._followable:
             followed = self._followed(given)
             found = followed if followed.code is Code.SOLVED else found
         if found.code in (Code.SOLVED, Code.UNSTABLE) and not np.isfinite(found.state).all():
@@ -343,12 +345,16 @@ class Globalised:
             return None
         if found.negative <= 0 or not self.program.model.minimisable:
             return found
-        return None if self.rules.escapes else replace(found, code=Code.UNSTABLE)
+        leaves = self.rules.escapes and self.program.model.downhill
+        return None if leaves else replace(found, code=Code.UNSTABLE)
 
     def _from(self, state: ca.DM, given: ca.DM) -> Outcome:
         """Downhill from a state to an equilibrium, and on from unstable ones, ``escapes`` times."""
-        if not self.program.model.minimisable:
-            return self._corrected(self._at(state, given), given, self._left)
+        model = self.program.model
+        if not model.downhill:
+            found = self._corrected(self._at(state, given), given, self._left)
+            unstable = model.minimisable and found.code is Code.SOLVED and found.negative > 0
+            return replace(found, code=Code.UNSTABLE) if unstable else found
         for _ in range(self.rules.escapes + 1):
             found = self._descended(self._at(state, given), given)
             if found.code is not Code.SOLVED or found.negative <= 0:

@@ -105,8 +105,7 @@ class StabilityTest:
         self._in_a = np.flatnonzero((equations.row >= equations.unknowns) & (column >= 0))
         self._a_column = column[self._in_a]
         self._diagonal = np.flatnonzero(self._h_row == self._h_column)
-        # On an edge the place is given by where the edge is.
-        self._apart = sum(sum(point.slides) for point in equations.model.mesh.points if not point.edge)
+        self._apart = equations.model.mesh.sliding
 
     @functools.cached_property
     def _combine(self) -> Array:

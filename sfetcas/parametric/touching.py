@@ -1,0 +1,103 @@
+"""Equilibria as functions of parameters where members touch obstacles or each other at places.
+
+With the places that touch an equilibrium is one of a model like any other.  For other numbers they are kept; then it is
+looked whether they all push, and nothing else touches.  Where that is not so what touches is found anew, as statics
+finds it for these numbers, and has a solver of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from ..contact.kept import Kept
+from ..equilibria.settings import Settings
+from ..equilibria.single import solved_from
+from ..equilibria.statics import solve
+from ..errors import SceneError, SolveError, Status
+from ..mathematics.arrays import Array
+from ..mechanics.mesh import Mesh
+from ..mechanics.model import assemble
+from ..solvers.prepared import Prepared, Solved
+from .arguments import Arguments
+from .equilibrium import EquilibriumSolver, in_contact, kept_of, touching_mesh
+from .results import Results
+
+__all__ = ["Touching"]
+
+
+@dataclass(frozen=True, eq=False)
+class Touching:
+    """The solvers of one scene, by what touches.
+
+    Attributes
+    ----------
+    first : EquilibriumSolver
+        That of the answer of statics.
+    settings : Settings
+    equilibria : dict
+        What is kept of each solver by who asks for it.
+    """
+
+    first: EquilibriumSolver
+    settings: Settings
+    equilibria: dict[EquilibriumSolver, Any] = field(default_factory=dict)
+
+    def kept(self, solver: EquilibriumSolver, numbers: Array, flat: Array) -> Kept:
+        """What touches at an equilibrium for numbers (numbers,)."""
+        model, arguments = solver.model, solver.arguments
+        scene = arguments.scene_at(numbers)
+        mesh = arguments.mesh_at(scene, model.mesh)
+        own = Prepared(assemble(scene, mesh, assembly=model.assembly, scales=model.scales))  # type: ignore[arg-type]
+        loading, state = own.model.loading(scene.analysis.steps[-1]), arguments.program.state(flat)
+        return kept_of(scene, self.settings, Solved(own, state, loading, own.equations.at(state, loading), 0.0))
+
+    def refuse_doubt(self, solver: EquilibriumSolver, numbers: Array, flat: Array) -> None:
+        """Refuse derivatives where they differ to the sides of a change.
+
+        Raises
+        ------
+        SolveError
+            Something touches without a force; names it.
+        """
+        for what in self.kept(solver, numbers, flat).undecided():
+            raise SolveError(Status.KINK, f"{what}, and derivatives differ to either side")
+
+    def anew(self, numbers: Array) -> tuple[EquilibriumSolver, Array]:
+        """The solver of what touches as statics finds it for numbers (numbers,), and the state there (states,).
+
+        Raises
+        ------
+        SolveError
+            Statics finds no equilibrium, or one in which members lie along something.
+        """
+        scene = self.first.arguments.scene_at(numbers)
+        static = scene.analysis.model_copy(update={"type": "static", "equilibria": "one"})
+        scene = scene.model_copy(update={"analysis": static})
+        answer = solve(scene, self.settings).last
+        try:
+            mesh = touching_mesh(scene, self.settings, answer)
+        except SceneError as error:
+            raise SolveError(Status.FAILED, error.bare, answer.state) from None
+        solver = self._solver(mesh)
+        return solver, in_contact(kept_of(scene, self.settings, solved_from(answer)), solver)
+
+    def _solver(self, mesh: Mesh) -> EquilibriumSolver:
+        """The solver in which the same touches, on whatever mesh."""
+        for solver in (self.first, *self.equilibria):
+            if _what(solver.model.mesh) == _what(mesh):
+                return solver
+        first = self.first
+        base = assemble(first.scene, mesh, assembly=first.model.assembly, scales=first.model.scales)  # type: ignore[arg-type]
+        names = [one.name for one in first.results.results]
+        results = Results(base, names, first.results.places, unique=first.unique)
+        arguments = Arguments(first.scene, base, first.arguments.arguments, results, f"{first.name}_", needed=False)
+        return replace(first, arguments=arguments, results=results, start=None)
+
+
+def _what(mesh: Mesh) -> list[tuple[Any, ...]]:
+    """What touches on a mesh, and whether it slides there; where that is it finds itself."""
+    return [
+        (p.contact, p.members, p.slides, p.edge, [x for x, free in zip(p.at, p.slides, strict=True) if not free])
+        for p in mesh.points
+    ]

@@ -1,0 +1,219 @@
+"""Parameters and derivatives where members touch something: against differences of statics, and other touches."""
+
+import numpy as np
+import pytest
+
+from sfetcas import Measurement, Scene, SceneError, SolveError, Status, fit, parametric, solve
+from sfetcas.parametric.arguments import with_values
+
+FLOOR = {"type": "plane", "point": [0, -0.3], "normal": [0, 1]}
+DRUM = {"type": "circle", "center": [0.6, -0.5], "radius": 0.3}
+
+
+def table(contact, load=(0, -2), accuracy=1e-9, **more):
+    """A cantilever of unit length with a force at its end, and an obstacle."""
+    return {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"beam": {"nodes": ["A", "B"], "section": "s"}},
+        "loads": {"F": {"type": "force", "node": "B", "value": list(load)}},
+        "contacts": {"c": {**contact, "members": "all"}},
+        "analysis": {"accuracy": accuracy},
+        **more,
+    }
+
+
+def told(scene, names):
+    """Answers of statics, flat; of several places the resultant."""
+    last, found = solve(scene).last, []
+    for name in names:
+        kind, record, key = name.split(".")
+        value = np.asarray(last.table(kind, record)[key], dtype=float)
+        found.append(value.reshape(-1, 3).sum(axis=0) if key == "force" else value.ravel())
+    return np.concatenate(found)
+
+
+SPACE = {"sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8}}, "dimension": "space"}
+CARRIED = {
+    "nodes": {
+        "A": {"position": [0, 0], "support": "clamped"},
+        "B": {"position": [1, 0]},
+        "C": {"position": [0.6, -1], "support": "clamped"},
+        "D": {"position": [0.6, -0.4]},
+    },
+    "members": {"beam": {"nodes": ["A", "B"], "section": "s"}, "post": {"nodes": ["C", "D"], "section": "s"}},
+    "contacts": {"c": {"type": "circle", "center": [0.6, -0.3], "radius": 0.15, "member": "beam", "node": "D"}},
+}
+CROSSING = {
+    "nodes": {
+        "A": {"position": [0, 0, 0], "support": "clamped"},
+        "B": {"position": [1, 0, 0]},
+        "C": {"position": [0.6, -0.5, -0.1], "support": "clamped"},
+        "D": {"position": [0.6, 0.5, -0.1]},
+    },
+    "members": {"beam": {"nodes": ["A", "B"], "section": "s"}, "post": {"nodes": ["C", "D"], "section": "s"}},
+    "contacts": {"c": {"type": "members", "members": "all", "radius": 0.04}},
+}
+EDGE = {"type": "point", "position": [0.6, -0.1], "side": [0, 1]}
+WALL = {"type": "plane", "point": [0, 0, -0.3], "normal": [0, 0, 1]}
+
+PLACE = ["nodes.B.position", "contacts.c.force", "contacts.c.at", "reactions.A.moment"]
+
+
+@pytest.mark.parametrize(
+    ("parts", "names"),
+    [
+        (
+            table(DRUM),
+            ["loads.F.value", "contacts.c.center", "sections.s.EI3", "nodes.B.position.0"],
+        ),
+        (table({**DRUM, "member_radius": 0.02}), ["contacts.c.member_radius"]),
+        (table(EDGE), ["contacts.c.position", "loads.F.value"]),
+        (table(FLOOR, (0.5, -2)), ["contacts.c.point", "contacts.c.normal"]),
+        (table(WALL, (0.3, 0.2, -2), **SPACE), ["contacts.c.normal"]),
+        (table({}, **CARRIED), ["contacts.c.radius", "contacts.c.center", "nodes.D.position"]),
+        (table({}, (0.05, 0.02, -1), **SPACE, **CROSSING), ["contacts.c.radius"]),
+    ],
+    ids=["drum", "radius", "edge", "floor", "space", "carried", "crossing"],
+)
+def test_derivatives_are_those_of_statics(parts, names):
+    scene = Scene.from_dict(parts)
+    function = parametric(scene, names, PLACE)
+    answer = function.solve()
+    assert answer.stable is True
+    for i, own in enumerate(np.eye(len(function.numbers))):
+        value, step = function.solver.arguments.defaults, 1e-5
+        ends = (with_values(scene, function.by_parameter(value + sign * step * own)) for sign in (1.0, -1.0))
+        up, down = (told(each, PLACE) for each in ends)
+        wanted = (up - down) / (2.0 * step)
+        # Positions are known to 1e-9 or better, over twice the step; forces to ten times that.
+        assert answer.flat_jacobian[:, i] == pytest.approx(wanted, rel=1e-6, abs=1e-5)
+
+
+def test_second_derivatives():
+    function = parametric(Scene.from_dict(table(DRUM)), ["contacts.c.radius", "loads.F.value"], PLACE)
+    # Elsewhere than where an element ends at the place, where those of the mesh jump.
+    here, step = function.solve({"contacts.c.radius": 0.305}), 1e-5
+    ends = (function.solve({"contacts.c.radius": 0.305 + sign * step}, here) for sign in (1.0, -1.0))
+    up, down = (end.flat_jacobian for end in ends)
+    for i, row in enumerate((up - down) / (2.0 * step)):
+        found = here.flat_hessian(np.eye(len(up))[i])[0]
+        # Rounding of first derivatives, 1e-12 of what is up to 1e2, over the step.
+        assert found == pytest.approx(row, rel=1e-5, abs=1e-4)
+
+
+def test_section_forces_beside_a_place_within_an_element():
+    scene = Scene.from_dict(table(DRUM))
+    at = [0.3, 0.7, 0.79, 0.83, 0.9]
+    places = {"beam": at}
+    function = parametric(scene, ["loads.F.value"], ["members.beam.force", "members.beam.moment"], places=places)
+    # Where it touches moves by 0.01 within its element.
+    answer = function.solve({"loads.F.value": [0.0, -3.0]})
+    fine = solve(answer.of.scene_at(answer.values)).last.along("beam", np.array(at))
+    touches = solve(answer.of.scene_at(answer.values)).last.contacts["c"]["at"]
+    assert not any(abs(touches - x) < 1e-3 for x in at)
+    # As near as the mesh of other loads is, which errors() tells of positions and moments.
+    for key in ("force", "moment"):
+        assert answer[f"members.beam.{key}"] == pytest.approx(fine[key], abs=1e-3)
+
+
+# -- what else touches -------------------------------------------------------------------------------------------
+
+
+def two():
+    parts = table({**DRUM, "center": [0.4, -0.3], "radius": 0.25}, accuracy=1e-8)
+    parts["contacts"]["d"] = {"type": "circle", "center": [0.8, -0.45], "radius": 0.1, "members": "all"}
+    return Scene.from_dict(parts)
+
+
+def test_what_touches_is_found_anew_where_it_is_something_else():
+    names = ["nodes.B.position", "contacts.c.force", "contacts.d.force"]
+    function = parametric(two(), ["loads.F.value"], names)
+    last, counts = function.solve(), []
+    for load in ([0, -2], [0, -5], [0, -8], [0, 1], [0, -0.1], [0, -4]):
+        last = function.solve({"loads.F.value": load}, last)
+        wanted = told(function.scene_at(last.values), names)
+        found = np.concatenate([last[name] for name in names])
+        # Places are within elements of the mesh of the first loads: errors() says 2e-5 at the last.
+        assert found == pytest.approx(wanted, abs=1e-4 * max(1.0, np.abs(wanted).max()))
+        counts.append(len(last.of.solver.model.mesh.points))
+        assert last.jacobian["nodes.B.position"]["loads.F.value"][1, 1] > 0.0
+    assert counts == [1, 2, 2, 0, 0, 1]
+    # The same is no other solver.
+    assert len(function.touching.equilibria) == 3
+
+
+def test_derivatives_where_something_touches_without_a_force():
+    scene = Scene.from_dict(table({**DRUM, "center": [0.5, -0.5], "radius": 0.5}, load=(0, -1e-9)))
+    answer = parametric(scene, ["loads.F.value"], ["nodes.B.position"]).solve()
+    with pytest.raises(SolveError, match=r"contacts\.c touches beam at 0\.5 without a force, and derivatives") as error:
+        _ = answer.flat_jacobian
+    assert error.value.status is Status.KINK
+
+
+def test_stiffness_is_counted_without_where_it_touches():
+    """The Lagrangian is largest in where the beam touches; an arch that would snap is unstable all the same."""
+    function = parametric(Scene.from_dict(table(DRUM)), ["loads.F.value"], ["compliance.B"])
+    answer = function.solve()
+    assert answer.outcome.negative == 0
+    step = parametric(Scene.from_dict(table(DRUM)), ["loads.F.value"], ["nodes.B.position"]).solve()
+    assert answer["compliance.B"][:2, :2] == pytest.approx(step.jacobian["nodes.B.position"]["loads.F.value"][:2])
+
+
+def test_a_fit_in_contact_finds_the_stiffness():
+    scene = Scene.from_dict(table(DRUM))
+    true = with_values(scene, {"sections.s.EI3": 1.3})
+    seen = Measurement("nodes.B.position", solve(true).last.position("B"), 1e-6)
+    found = fit(scene, {"sections.s.EI3": (0.5, 3.0)}, [seen])
+    # The mesh is that of the first stiffness.
+    assert found.estimates["sections.s.EI3"] == pytest.approx(1.3, rel=1e-4)
+
+
+# -- what is refused ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("parts", "answers", "sentence"),
+    [
+        (
+            table({**FLOOR, "friction": 0.3}),
+            None,
+            r"contacts\.c\.friction: what sticks and slides depends on the steps",
+        ),
+        (table(DRUM, (0, -20)), ["contacts.d.at"], r"contacts\.d\.at: found 'd', accepted: c"),
+        (
+            table(
+                FLOOR,
+                springs={
+                    "k": {"type": "translational", "node": "B", "direction": [0, 1], "stiffness": 1.0, "stop": [-1, 1]}
+                },
+            ),
+            None,
+            r"contacts\.c: what touches beside stops",
+        ),
+        (
+            table({**FLOOR, "point": [0, 0]}, loads={"W": {"type": "distributed", "member": "beam", "value": [0, -5]}}),
+            None,
+            r"member 'beam' lies along contacts\.c, accepted: members that touch at places",
+        ),
+        (
+            table({**FLOOR, "point": [0, -2]}),
+            ["contacts.c.at"],
+            "touches at 0 places, accepted: one that touches at one",
+        ),
+    ],
+    ids=["friction", "name", "stops", "lies", "nowhere"],
+)
+def test_refused(parts, answers, sentence):
+    with pytest.raises(SceneError, match=sentence):
+        parametric(Scene.from_dict(parts), ["factor"], answers)
+
+
+def test_lines_for_other_numbers_are_refused():
+    weight = {"W": {"type": "distributed", "member": "beam", "value": [0, -3]}}
+    function = parametric(Scene.from_dict(table({**FLOOR, "point": [0, -0.1]}, loads=weight)), ["loads.W.value"])
+    assert function.solve({"loads.W.value": [0, -4]})["contacts.c.force"][1] > 0.0
+    with pytest.raises(
+        SolveError, match=r"member 'beam' lies along contacts\.c, accepted: members that touch at places"
+    ):
+        function.solve({"loads.W.value": [0, -60]})
