@@ -510,7 +510,6 @@ def test_what_needs_smooth_equations_is_refused(tmp_path):
     scene = made(rod(0.1, 0.2, {"end": 0.1}))
     for refused in (
         lambda: sfetcas.export(scene, tmp_path),
-        lambda: sfetcas.Design(scene),
         lambda: sfetcas.OptimalControl(scene, {"sections.s.rhoA": (0, 1)}, time=1.0),
         lambda: sfetcas.motion_functions(scene),
     ):

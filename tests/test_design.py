@@ -286,7 +286,7 @@ def out_of_the_plane():
 
 
 SCENE = cantilever()
-WALL = {"wall": Contact(member="beam", type="plane", point=[0, -1], normal=[0, 1])}
+ROUGH = {"wall": Contact(member="beam", type="plane", point=[0, -1], normal=[0, 1], friction=0.2)}
 
 
 @pytest.mark.parametrize(
@@ -320,7 +320,7 @@ WALL = {"wall": Contact(member="beam", type="plane", point=[0, -1], normal=[0, 1
         ),
         (lambda: find(SCENE, ["loads.tip.value"], {"nodes.tip.position": [0, 1, 2, 3]}), "found 4 numbers"),
         (lambda: Design(SCENE.replace(analysis=Analysis(type="path", range=[0, 1]))), "found 'path', accepted: static"),
-        (lambda: Design(SCENE.replace(contacts=WALL)), "contact is found by a search"),
+        (lambda: Design(SCENE.replace(contacts=ROUGH)), "what sticks and slides depends on the steps before"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_sentence(action, sentence):

@@ -139,7 +139,7 @@ class Design(Cases):
     Parameters
     ----------
     scene : Scene
-        Static and without contact.
+        Static; where members touch something, at places, and the same in all cases.
     variables : mapping of str to (low, high) or Parameter
         Numbers of the scene that are unknown and the same in all cases, with their bounds (possibly infinite).
     cases : mapping of str to mapping of str to numbers
@@ -156,7 +156,7 @@ class Design(Cases):
     Raises
     ------
     SceneError
-        Numbers that the scene does not have, bounds that contradict each other, a scene with contact or in motion.
+        Numbers that the scene does not have, bounds that contradict each other, a scene with friction or in motion.
 
     Examples
     --------

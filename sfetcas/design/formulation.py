@@ -98,7 +98,7 @@ class Formulation(Statement):
     """
 
     def __init__(self, scene: Scene, cases: Sequence[str], accuracy: float | None = None) -> None:
-        refuse_search(scene)
+        refuse_search(scene, "no part of a design", touching=True)
         if scene.analysis.type != "static":
             message = f"found {scene.analysis.type!r}, accepted: static, an equilibrium for each case"
             raise SceneError(message, ("analysis", "type"))

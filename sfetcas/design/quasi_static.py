@@ -133,7 +133,7 @@ class QuasiStatic(Cases):
     Parameters
     ----------
     scene : Scene
-        Static and without contact.
+        Static; where members touch something, at places, and the same everywhere.
     inputs : mapping of str to (low, high)
         Numbers of the scene that are unknown at each point of the path, with their bounds.
     points : int

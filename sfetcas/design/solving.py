@@ -10,18 +10,22 @@ import casadi as ca
 import numpy as np
 
 from .. import tolerances
+from ..contact.kept import Kept
 from ..description.records import counted
 from ..equilibria.settings import Settings
+from ..equilibria.single import solved_from
 from ..equilibria.solution import Equilibrium
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import NLP, Ipopt, NLPResult
 from ..mathematics.threads import single_threaded
+from ..mechanics.equations import State
 from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
-from ..parametric.equilibrium import asked_mesh
+from ..parametric.equilibrium import asked_mesh, in_contact, kept_of, what_touches
 from ..solvers.continuation import advanced
+from ..solvers.prepared import Solved
 from .assembled import REQUIRED, Assembled, Pair, places_asked
 from .bounds import refuse_contradictions
 from .certifying import Certified, certified
@@ -133,22 +137,37 @@ class Solving:
         self.formulation, self._kernels = formulation, kernels
         self._solver = solver or Ipopt(tolerance=1e-11, iterations=300, extra=ENOUGH)
         self.iterations = 0
+        self._meshes: list[Mesh] = []
+        self._found: dict[int, Equilibrium] = {}
 
     # -- the beginning ------------------------------------------------------------------------------
 
-    def _pilots(self) -> dict[int, Equilibrium]:
+    def _pilots(self, values: Mapping[str, Array]) -> dict[int, Equilibrium]:
+        """Equilibria of some cases for values of the unknowns.
+
+        Raises
+        ------
+        SceneError
+            A case has no equilibrium.
+        SolveError
+            In one case something else touches than in another.
+        """
         count = len(self.formulation.cases)
         chosen = sorted({round(x) for x in np.linspace(0, count - 1, min(PILOTS, count))})
         settings = Settings(accuracy=self.formulation.accuracy)
         found: dict[int, Equilibrium] = {}
-        self._meshes: list[Mesh] = []
+        self._meshes = []
         for i in chosen:
-            scene = self._scene(i, self.formulation.guesses)
+            scene = self._scene(i, values)
             try:
                 mesh, self._assembly, found[i] = asked_mesh(scene, settings)
             except SceneError as error:
                 raise SceneError(labelled(self.formulation.cases[i], str(error)), ("guess",)) from None
             self._meshes.append(mesh)
+            if what_touches(mesh) != what_touches(self._meshes[0]):
+                names = " and ".join(labelled(self.formulation.cases[k], "").rstrip(": ") for k in (chosen[0], i))
+                detail = f"something else touches in the cases {names}, accepted: the same in all cases"
+                raise SolveError(Status.FAILED, detail)
         return found
 
     def _scene(self, case: int, values: Mapping[str, Array]) -> Any:
@@ -163,16 +182,16 @@ class Solving:
         free = np.flatnonzero(unknown).tolist()
         return CaseEquations(self.formulation.scene, mesh, self._assembly, arguments, free, names, places)
 
-    def _begun(self, equations: CaseEquations, pilots: Mapping[int, Equilibrium]) -> Array:
-        """Equilibria at the guess, those without a pilot from the case before."""
+    def _begun(self, equations: CaseEquations, pilots: Mapping[int, Equilibrium], values: Mapping[str, Array]) -> Array:
+        """Equilibria for values of the unknowns, those without a pilot from the case before."""
         formulation, program = self.formulation, equations.program
         names = [one.name for one in equations.arguments.arguments]
         states: list[Array] = []
         for i, case in enumerate(formulation.cases):
-            own = formulation.numbers_of(i, formulation.guesses)
+            own = formulation.numbers_of(i, values)
             defaults = equations.arguments.defaults
             numbers = np.array([own.get(name, x) for name, x in zip(names, defaults, strict=True)])
-            starts = [transferred(pilots[i].model, pilots[i].state, equations.model)] if i in pilots else []
+            starts = [self._start(i, values, pilots[i], equations)] if i in pilots else []
             starts += [program.state(states[-1])] if states else []
             found = next((s for s in (equations.equilibrium(numbers, x)[0] for x in starts) if s is not None), None)
             if found is None:
@@ -181,11 +200,21 @@ class Solving:
             states.append(found)
         return np.stack(states)
 
+    def _start(self, case: int, values: Mapping[str, Array], pilot: Equilibrium, equations: CaseEquations) -> State:
+        """A pilot as a state of the equations."""
+        if not equations.mesh.points:
+            return transferred(pilot.model, pilot.state, equations.model)
+        return in_contact(self._kept(case, values, solved_from(pilot)), equations.model)
+
+    def _kept(self, case: int, values: Mapping[str, Array], found: Solved) -> Kept:
+        """What touches in a state of a case."""
+        return kept_of(self._scene(case, values), Settings(accuracy=self.formulation.accuracy), found)
+
     # -- rounds -------------------------------------------------------------------------------------
 
     @single_threaded
     def solve(self) -> Optimum:
-        """Solve the formulation.
+        """Solve the formulation; where something else touches in the solution, again with that, from there.
 
         Raises
         ------
@@ -195,26 +224,54 @@ class Solving:
             No solution was found; ``last`` is the last :class:`Iterate`.
         """
         refuse_contradictions(self.formulation)
-        pilots = self._pilots()
+        values: Mapping[str, Array] = self.formulation.guesses
+        tried = []
+        while True:
+            optimum, error = self._solved(values)
+            changed = self._changed(optimum)
+            if not changed and error <= self.formulation.accuracy:
+                return optimum
+            tried.append(what_touches(optimum.mesh))
+            values = optimum.iterate.values
+            self._pilots(values)
+            if what_touches(self._meshes[0]) in tried:
+                detail = f"what touches does not settle: {changed or 'statics finds something else'}"
+                raise SolveError(Status.FAILED, f"{detail} in the solution for another touch", optimum.iterate)
+
+    def _changed(self, optimum: Optimum) -> str:
+        """What touches otherwise in a solution than it was found for, as a sentence; empty where nothing does."""
+        for i, case in enumerate(optimum.cases if self.formulation.scene.contacts else ()):
+            for what in self._kept(i, optimum.iterate.values, case.solved).changed():
+                return labelled(self.formulation.cases[i], what)
+        return ""
+
+    def _solved(self, values: Mapping[str, Array]) -> tuple[Optimum, float]:
+        """The solution with what touches for values of the unknowns, from these, and its error; where something else
+        touches there the error may be larger than it was asked for.
+        """
+        pilots = self._pilots(values)
         mesh = _united(self._meshes)
         equations = self._equations(mesh)
-        states, values = self._begun(equations, pilots), self.formulation.guesses
+        states = self._begun(equations, pilots, values)
         pairs: list[Pair] = []
-        for _ in range(ROUNDS):
+        for rounds in range(ROUNDS):
             program = Assembled(self.formulation, equations, states, values, pairs, self._kernels)
             self._refuse_too_many(program)
             result, cases = self._best(program)
             states, values = program.arrived(result.x), program.values(result.x)
             error = max(case.error for case in cases)
             if error > self.formulation.accuracy:
-                mesh = mesh.refined()
+                fitted = self._fitted(values) if mesh.points and not rounds else None
+                if fitted and what_touches(fitted) != what_touches(mesh):
+                    return self._answer(program, result, cases), error
+                mesh = fitted or mesh.refined()
                 finer = self._equations(mesh)
-                states, equations = _onto(equations, finer, states), finer
-                pairs = []
+                states = self._begun(finer, self._found, values) if fitted else _onto(equations, finer, states)
+                equations, pairs = finer, []
                 continue
             more = self._unstable(cases, program, result, pairs)
             if not more:
-                return self._answer(program, result, cases)
+                return self._answer(program, result, cases), error
             pairs = more
         if error > self.formulation.accuracy:
             detail = f"positions differ by {error:.1e} on half the elements after {counted(ROUNDS, 'mesh', 'meshes')}"
@@ -222,6 +279,11 @@ class Solving:
         cases_kept = dict.fromkeys(self.formulation.cases[pair.case] for pair in pairs)
         detail = labelled(", ".join(cases_kept), "cannot be kept stable")
         raise SolveError(Status.UNMET, detail, self._iterate(program, result))
+
+    def _fitted(self, values: Mapping[str, Array]) -> Mesh:
+        """A mesh in which elements end where places touch for values of the unknowns."""
+        self._found = self._pilots(values)
+        return _united(self._meshes)
 
     def _refuse_too_many(self, program: Assembled) -> None:
         free, rows = program.freedom

@@ -22,6 +22,7 @@ from ..errors import SceneError, SolveError
 from ..mathematics.arrays import Array
 from ..mechanics.accuracy import every_other
 from ..mechanics.contact_points import undeformed_vectors
+from ..mechanics.equations import State
 from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
@@ -40,6 +41,7 @@ __all__ = [
     "kept_of",
     "refuse_search",
     "touching_mesh",
+    "what_touches",
 ]
 
 Place = Mapping[str, Sequence[float]]
@@ -221,7 +223,8 @@ def equilibrium_solver(
     solver = EquilibriumSolver(name, scene, known, outputs, rules, start, answer)
     if mesh.points:
         # What touches does so near its answer alone.
-        return replace(solver, start=in_contact(kept_of(scene, settings or Settings(), solved_from(answer)), solver))
+        begun = in_contact(kept_of(scene, settings or Settings(), solved_from(answer)), solver.model)
+        return replace(solver, start=known.program.flat(begun))
     return solver if start is not None or _same(solver) else replace(solver, start=_answered(solver))
 
 
@@ -335,26 +338,33 @@ def kept_of(scene: Scene, settings: Settings, found: Solved) -> Kept:
     return Kept(scene, prepare, settings.accuracy or scene.analysis.accuracy, (), found)
 
 
-def in_contact(kept: Kept, solver: EquilibriumSolver) -> Array:
-    """An answer of statics in contact as a state (states,) of a solver in which the same touches.
+def in_contact(kept: Kept, model: Model) -> State:
+    """An answer of statics in contact as a state of a model in which the same touches.
 
     Places begin elsewhere along their members there, and units may be others.
     """
-    scene, mesh = kept.scene, solver.model.mesh
+    scene, mesh = kept.scene, model.mesh
     points = kept.points(mesh)
     state = kept.start(kept.run.prepare(replace(mesh, points=points)))
-    y, number = state.y.copy(), {name: i for i, name in enumerate(solver.model.positions.unknowns)}
-    unit, target = kept.rest.model.scales, solver.model.scales
+    y, number = state.y.copy(), {name: i for i, name in enumerate(model.positions.unknowns)}
+    unit, target = kept.rest.model.scales, model.scales
     begins = zip(undeformed_vectors(scene, points), undeformed_vectors(scene, mesh.points), strict=True)
     for now, point, (here, there) in zip(points, mesh.points, begins, strict=True):
         for side, member in enumerate(point.members):
             if point.slides[side]:
                 moved = (now.at[side] - point.at[side]) * scene.center_lines[member].length
                 y[number[f"{point.place(side)}, arc length"]] += moved / unit.length
-        for k in range(solver.model.element.axes):
+        for k in range(model.element.axes):
             y[number[f"{point.between}, {'xyz'[k]}"]] += (here - there)[k] / unit.length
-    state = replace(state, y=y * unit.length / target.length, lam=state.lam * unit.force / target.force)
-    return solver.arguments.program.flat(state)
+    return replace(state, y=y * unit.length / target.length, lam=state.lam * unit.force / target.force)
+
+
+def what_touches(mesh: Mesh) -> list[tuple[Any, ...]]:
+    """What touches on a mesh, and whether it slides there; where that is it finds itself."""
+    return [
+        (p.contact, p.members, p.slides, p.edge, [x for x, free in zip(p.at, p.slides, strict=True) if not free])
+        for p in mesh.points
+    ]
 
 
 def chosen_places(members: Sequence[str], given: Place) -> dict[str, tuple[float, ...]]:

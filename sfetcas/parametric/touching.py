@@ -20,7 +20,7 @@ from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
 from ..solvers.prepared import Prepared, Solved
 from .arguments import Arguments
-from .equilibrium import EquilibriumSolver, in_contact, kept_of, touching_mesh
+from .equilibrium import EquilibriumSolver, in_contact, kept_of, touching_mesh, what_touches
 from .results import Results
 
 __all__ = ["Touching"]
@@ -80,12 +80,13 @@ class Touching:
         except SceneError as error:
             raise SolveError(Status.FAILED, error.bare, answer.state) from None
         solver = self._solver(mesh)
-        return solver, in_contact(kept_of(scene, self.settings, solved_from(answer)), solver)
+        begun = in_contact(kept_of(scene, self.settings, solved_from(answer)), solver.model)
+        return solver, solver.arguments.program.flat(begun)
 
     def _solver(self, mesh: Mesh) -> EquilibriumSolver:
         """The solver in which the same touches, on whatever mesh."""
         for solver in (self.first, *self.equilibria):
-            if _what(solver.model.mesh) == _what(mesh):
+            if what_touches(solver.model.mesh) == what_touches(mesh):
                 return solver
         first = self.first
         base = assemble(first.scene, mesh, assembly=first.model.assembly, scales=first.model.scales)  # type: ignore[arg-type]
@@ -93,11 +94,3 @@ class Touching:
         results = Results(base, names, first.results.places, unique=first.unique)
         arguments = Arguments(first.scene, base, first.arguments.arguments, results, f"{first.name}_", needed=False)
         return replace(first, arguments=arguments, results=results, start=None)
-
-
-def _what(mesh: Mesh) -> list[tuple[Any, ...]]:
-    """What touches on a mesh, and whether it slides there; where that is it finds itself."""
-    return [
-        (p.contact, p.members, p.slides, p.edge, [x for x, free in zip(p.at, p.slides, strict=True) if not free])
-        for p in mesh.points
-    ]

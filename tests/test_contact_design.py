@@ -1,0 +1,113 @@
+"""Inverse problems and designs where members touch something: against statics, and where something else touches."""
+
+import casadi as ca
+import pytest
+
+from sfetcas import Design, QuasiStatic, Scene, SceneError, SolveError, find, solve
+
+DRUM = {"type": "circle", "center": [0.6, -0.5], "radius": 0.3}
+FLOOR = {"type": "plane", "point": [0, -0.3], "normal": [0, 1]}
+
+
+def pressed(contacts, load=(0, -2), **more):
+    """A cantilever of unit length with a force at its end, and obstacles."""
+    return Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0}},
+            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+            "members": {"beam": {"nodes": ["A", "B"], "section": "s"}},
+            "loads": {"F": {"type": "force", "node": "B", "value": list(load)}},
+            "contacts": {name: {**contact, "members": "all"} for name, contact in contacts.items()},
+            "analysis": {"accuracy": 1e-8},
+            **more,
+        }
+    )
+
+
+def design(scene, variables, **more):
+    return Design(scene, variables, kernels="interpreted", **more)
+
+
+def test_force_for_a_place_is_found():
+    wanted = [0.93, -0.34]
+    found = find(pressed({"c": DRUM}), ["loads.F.value"], {"nodes.B.position": wanted})
+    step = solve(found.scene()).last
+    assert step.position("B")[:2] == pytest.approx(wanted, abs=1e-7)
+    assert step.contacts["c"]["at"] is not None
+    # The place has moved by a tenth, and elements end where it is now.
+    assert found.replayed() < 1e-9
+
+
+def test_obstacle_for_a_force():
+    problem = design(pressed({"c": DRUM}), {"contacts.c.radius": (0.2, 0.4)})
+    problem.minimise((problem.answer("", "contacts.c.force")[1] - 1.5) ** 2)
+    radius = problem.solve().values["contacts.c.radius"]
+    step = solve(pressed({"c": {**DRUM, "radius": radius}})).last
+    # The force changes by ten times the radius, and is known to a hundred times the accuracy.
+    assert step.contacts["c"]["force"][1] == pytest.approx(1.5, abs=1e-5)
+
+
+def two():
+    low = {"type": "circle", "center": [0.8, -0.45], "radius": 0.1}
+    return pressed({"c": {**DRUM, "center": [0.4, -0.3], "radius": 0.25}, "d": low})
+
+
+@pytest.mark.parametrize(("goal", "touching"), [(-0.3832, 2), (0.2, 0)], ids=["more", "nothing"])
+def test_what_else_touches_is_found(goal, touching):
+    problem = design(two(), {"loads.F.value": (-9, 9)}, accuracy=1e-7)
+    sideways = problem.variable("loads.F.value")[0]
+    problem.minimise((problem.answer("", "nodes.B.position")[1] - goal) ** 2 + 1e-6 * sideways**2)
+    answer = problem.solve()
+    step = solve(answer.scene()).last
+    assert step.position("B")[1] == pytest.approx(goal, abs=1e-6)
+    assert sum(entry["at"] is not None for entry in step.contacts.values()) == touching
+
+
+def test_solution_where_something_begins_to_touch_is_refused():
+    """Less force pays as long as the beam is pressed on the drum, more as long as it is not."""
+    problem = design(pressed({"c": DRUM}), {"loads.F.value.1": (-9.0, -0.1)})
+    problem.minimise(6.0 * problem.answer("", "nodes.B.position")[1] - problem.variable("loads.F.value.1"))
+    with pytest.raises(SolveError, match=r"what touches does not settle: contacts\.c (leaves|touches)"):
+        problem.solve()
+
+
+def test_cases_touch_the_same():
+    loads = {"soft": {"loads.F.value": [0, -2]}, "hard": {"loads.F.value": [0, -8]}}
+    problem = design(two(), {"sections.s.EI3": (0.5, 2.0)}, cases=loads)
+    problem.minimise(problem.answer("soft", "nodes.B.position")[1] ** 2)
+    with pytest.raises(SolveError, match="something else touches in the cases soft and hard, accepted: the same"):
+        problem.solve()
+    near = {"soft": {"loads.F.value": [0, -2]}, "hard": {"loads.F.value": [0, -3]}}
+    problem = design(pressed({"c": DRUM}), {"sections.s.EI3": (0.5, 2.0)}, cases=near, accuracy=1e-7)
+    fall = problem.answer("soft", "nodes.B.position")[1] - problem.answer("hard", "nodes.B.position")[1]
+    problem.subject_to(fall == 0.0057)
+    answer = problem.solve()
+    apart = [solve(answer.scene(case)).last.position("B")[1] for case in near]
+    assert apart[0] - apart[1] == pytest.approx(0.0057, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("contacts", "more", "sentence"),
+    [
+        ({"c": {**FLOOR, "friction": 0.3}}, {}, r"contacts\.c\.friction: what sticks .* no part of a design"),
+        (
+            {"c": {**FLOOR, "point": [0, 0]}},
+            {"loads": {"W": {"type": "distributed", "member": "beam", "value": [0, -5]}}},
+            r"member 'beam' lies along contacts\.c, accepted: members that touch at places",
+        ),
+    ],
+    ids=["friction", "lies"],
+)
+def test_refused(contacts, more, sentence):
+    with pytest.raises(SceneError, match=sentence):
+        find(pressed(contacts, **more), ["sections.s.EI3"], {"reactions.A.moment.z": 1.0})
+
+
+def test_a_path_of_equilibria_that_touch():
+    problem = QuasiStatic(pressed({"c": DRUM}), {"loads.F.value": (-20, 20)}, points=3, kernels="interpreted")
+    force, tip = problem.input("loads.F.value"), problem.answer("nodes.B.position")
+    problem.subject_to(tip[:, 1] == -0.347 - 0.003 * problem.s)
+    problem.minimise(ca.sumsqr(force[:, 0]))
+    answer = problem.solve()
+    assert answer.stable
+    assert solve(answer.scene(2)).last.position("B")[1] == pytest.approx(-0.35, abs=1e-7)
