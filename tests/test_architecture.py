@@ -253,6 +253,7 @@ ORDER = [
     "parametric.sliding_tubes",
     "parametric.arguments",
     "parametric.changing",
+    "parametric.watching",
     "parametric.equilibrium",
     "parametric.implicit",
     "parametric.choosing",

@@ -35,7 +35,7 @@ def test_force_for_a_place_is_found():
     assert step.position("B")[:2] == pytest.approx(wanted, abs=1e-7)
     assert step.contacts["c"]["at"] is not None
     # The place has moved by a tenth, and elements end where it is now.
-    assert found.replayed() < 1e-9
+    assert found.replayed() < 1e-10
 
 
 def test_obstacle_for_a_force():

@@ -142,7 +142,7 @@ def _made(
         made = time_step(scene, name, results=results, places=places, **given)
         writer = StepWriter(made)
     else:
-        made = equilibrium_solver(scene, name, results=results, places=places, **given)
+        made = equilibrium_solver(scene, name, results=results, places=places, touching=True, watched=True, **given)
         writer = EquilibriumWriter(made, sensitivities=sensitivities)
     return made, writer.files()
 

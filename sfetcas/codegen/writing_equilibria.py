@@ -10,6 +10,7 @@ import numpy as np
 from ..description.records import counted
 from ..mathematics.source import sparsity_table, table
 from ..parametric.equilibrium import EquilibriumSolver
+from ..parametric.watching import LEAST
 from ..solvers.globalised import MEANINGS, Code
 from .rendering import Status, Writer, filled, row, rows, template
 
@@ -37,8 +38,10 @@ class EquilibriumWriter(Writer):
         """The functions of the solver and its program, and those that compute the results."""
         solver, program = self.solver, self.arguments.program
         found = [solver.prepare, solver.output, program.begin, program.hold, program.move, program.at, program.left]
-        if self.model.minimisable:
+        if self.model.downhill:
             found += [program.merit, program.convex]
+        if solver.margins is not None:
+            found.append(solver.margins)
         found.append(_pivots() if self.model.has_potential else program.linear)
         return [*found, solver.sensitivities] if self._sensitivities else found
 
@@ -50,7 +53,8 @@ class EquilibriumWriter(Writer):
     @property
     def statuses(self) -> list[Status]:
         """The codes of :class:`~sfetcas.solvers.globalised.Code`."""
-        return [(code.name, int(code), MEANINGS[code]) for code in Code]
+        codes = [code for code in Code if code is not Code.TOUCHES or self.solver.margins is not None]
+        return [(code.name, int(code), MEANINGS[code]) for code in codes]
 
     @property
     def states(self) -> int:
@@ -69,10 +73,16 @@ class EquilibriumWriter(Writer):
         }
 
     @property
+    def _margins(self) -> int:
+        """Number of margins that are looked at."""
+        margins = self.solver.margins
+        return 0 if margins is None else int(margins.numel_out(0))
+
+    @property
     def memory(self) -> int:
         """Number of doubles for states, residuals, matrices and factors."""
         given, total, entries, lower = self._sizes.values()
-        return 2 * given + 4 * max(1, self.states) + 8 * total + 5 * entries + lower
+        return 2 * given + 4 * max(1, self.states) + 8 * total + 5 * entries + lower + self._margins
 
     @property
     def own(self) -> dict[str, object]:
@@ -84,6 +94,7 @@ class EquilibriumWriter(Writer):
         return {
             **self._sizes,
             "indent": " " * len(f"int {self.name}_solve("),
+            "margins_declared": f"\n  double margins[{self._margins}];" if self._margins else "",
             "sensitivities_declared": filled(template("sensitivities.h"), names) if self._sensitivities else "",
             "model_in_words": f"In {self.where}: {flexible}, {unknowns}.",
             "about_sensitivities": SLOPES.format(name=self.name) if self._sensitivities else "",
@@ -113,6 +124,7 @@ class EquilibriumWriter(Writer):
         solver, program = self.solver, self.arguments.program
         equations = program.equations
         moments, loads = program.slice_of_moments, program.slice_of_loads
+        begun = solver.followed_from
         constants: dict[str, object] = {
             "TOTAL": program.expressions.total,
             "UNKNOWNS": equations.unknowns,
@@ -126,6 +138,11 @@ class EquilibriumWriter(Writer):
             "MOMENTS": moments.stop - moments.start,
             "SYMMETRIC": int(self.model.has_potential),
             "MINIMISABLE": int(self.model.minimisable),
+            "DOWNHILL": int(self.model.downhill),
+            "SLIDING": self.model.mesh.sliding,
+            "BEGUN": int(begun is not None),
+            "MARGINS": self._margins,
+            "LEAST": LEAST,
             "STARTED": int(solver.start is not None),
             **{key.upper(): value for key, value in vars(solver.rules).items()},
         }
@@ -138,7 +155,9 @@ class EquilibriumWriter(Writer):
             table("sf_soft", solver.method.soft),
             table("sf_start", solver.start if solver.start is not None else np.zeros(0)),
         ]
-        if self.model.minimisable:
+        if begun is not None:
+            found.append(table("sf_begun", begun[0]))
+        if self.model.downhill:
             found.append(table("sf_seed", solver.method.seed))
         if self.model.has_potential:
             lower, order = self._lower

@@ -42,6 +42,9 @@ SLIVER = 1e-6
 LASTING = 1e-10
 """Pull, dimensionless, that is rounding."""
 
+NEAREST = 1e-3
+"""Slope of the distance along a member from which on a place is not the nearest one, as where it does not push."""
+
 LINES, IDLE = 1e-3, 0.1
 """Share of what is little at a place that is so of one of many along a line, and share of a line on which nothing
 presses: less may be that of elements near its ends, where a force presses.
@@ -207,6 +210,10 @@ class Kept:
                 yield f"contacts.{point.contact} leaves {_places(point)}"
             elif any(not -SLIVER <= x <= 1.0 + SLIVER for x in point.at):
                 yield f"contacts.{point.contact} slides off {_places(point)}"
+            elif any(point.slides) and not point.edge:
+                slopes = self.closest.slopes(fields, point.pair, point.at)[list(point.slides)]
+                if np.abs(slopes).max() > NEAREST:
+                    yield f"contacts.{point.contact} is nearer beside {_places(point)}"
         for near in self.closest.found(fields, 0.0):
             if near.gap < -self.run.tolerance and not self._known(near):
                 yield _where(near)

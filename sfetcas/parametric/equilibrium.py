@@ -30,6 +30,7 @@ from ..solvers.globalised import Code, Globalised, Outcome, Rules
 from ..solvers.prepared import Prepared, Solved
 from .arguments import Arguments, Asked, asked_for, in_words
 from .results import Results, default_results
+from .watching import LEAST, margins_of
 
 __all__ = [
     "EquilibriumSolver",
@@ -71,6 +72,10 @@ class EquilibriumSolver:
         State from which a solve begins; None for the undeformed one.
     answer : Equilibrium
         The static answer for the last step of the scene on a finer mesh, by which the accuracy was checked.
+    margins : Function or None
+        Of a scene with contacts what is looked at, see :func:`~sfetcas.parametric.watching.margins_of`.
+    begun : ndarray (numbers,) or None
+        Where something touches the arguments of which ``start`` is the equilibrium.
     """
 
     name: str
@@ -80,6 +85,8 @@ class EquilibriumSolver:
     rules: Rules
     start: Array | None
     answer: Equilibrium
+    margins: ca.Function | None = None
+    begun: Array | None = None
 
     def __repr__(self) -> str:
         return shown(self, [self.name, self.model.size_in_words], in_words(self.arguments, self.results))
@@ -92,7 +99,14 @@ class EquilibriumSolver:
     @functools.cached_property
     def method(self) -> Globalised:
         """The globalised Newton method."""
-        return Globalised(self.arguments.program, Prepared(self.model).weight, self.rules)
+        return Globalised(self.arguments.program, Prepared(self.model).weight, self.rules, self.followed_from)
+
+    @property
+    def followed_from(self) -> tuple[Array, Array] | None:
+        """What is given at the start, and its state, where equilibria are not followed from zero."""
+        if self.begun is None or self.start is None:
+            return None
+        return np.array(self.prepare(self.begun)).ravel(), self.start
 
     @functools.cached_property
     def prepare(self) -> ca.Function:
@@ -152,7 +166,11 @@ class EquilibriumSolver:
         except RuntimeError:
             # A stiffness of what is singular.
             outputs = nothing
-        return (outcome, outputs) if np.isfinite(outputs).all() else (replace(outcome, code=Code.NOT_FINITE), nothing)
+        if not np.isfinite(outputs).all():
+            return replace(outcome, code=Code.NOT_FINITE), nothing
+        if self.margins is not None and not np.array(self.margins(p, outcome.state, given)).min(initial=0.0) >= LEAST:
+            return replace(outcome, code=Code.TOUCHES), nothing
+        return outcome, outputs
 
     @property
     def unique(self) -> bool:
@@ -181,6 +199,7 @@ def equilibrium_solver(
     settings: Settings | None = None,
     stopped: bool = False,
     touching: bool = False,
+    watched: bool = False,
 ) -> EquilibriumSolver:
     """The solver of a scene, on the mesh that its accuracy asks for.
 
@@ -195,6 +214,7 @@ def equilibrium_solver(
     settings : as of :func:`~sfetcas.equilibria.statics.solve`
     stopped : whether it is for what is taut and at a stop in the answer of statics only; else such scenes are refused
     touching : whether it is for what touches in the answer of statics only; else such scenes are refused
+    watched : whether a solve then looks whether the same touches
 
     Raises
     ------
@@ -220,11 +240,12 @@ def equilibrium_solver(
         # Straight members without slack bend to no side by themselves; a start chooses one.
         start = known.program.flat(prepared.guess(base.loading(scene.analysis.steps[-1]))[0])
     rules = Rules() if scene.analysis.unstable == "leave" else replace(Rules(), escapes=0)
-    solver = EquilibriumSolver(name, scene, known, outputs, rules, start, answer)
+    margins = margins_of(f"{name}_margins", base, known.arguments) if watched and scene.contacts else None
+    solver = EquilibriumSolver(name, scene, known, outputs, rules, start, answer, margins)
     if mesh.points:
         # What touches does so near its answer alone.
         begun = in_contact(kept_of(scene, settings or Settings(), solved_from(answer)), solver.model)
-        return replace(solver, start=known.program.flat(begun))
+        return replace(solver, start=known.program.flat(begun), begun=known.defaults)
     return solver if start is not None or _same(solver) else replace(solver, start=_answered(solver))
 
 

@@ -38,7 +38,7 @@ from ..mechanics.tendon_shares import NEWTON_STEPS, section_data, share_of, stre
 from ..mechanics.terms import answers_of
 from ..solvers.program import Program
 
-__all__ = ["Result", "Results", "default_motion_results", "default_results"]
+__all__ = ["Outputs", "Result", "Results", "default_motion_results", "default_results"]
 
 
 @dataclass(frozen=True)
@@ -375,7 +375,7 @@ class Results:
 
         ``speeds`` (axes, places) are velocities of a motion; ``short`` gives expressions with short derivatives.
         """
-        outputs = _Outputs(self, program, rest, speeds, program.forces if short else program.stationarity)
+        outputs = Outputs(self, program, rest, speeds, program.forces if short else program.stationarity)
         found = ca.vertcat(*(ca.densify(ca.vec(outputs.value(result.asked).T)) for result in self.results))
         # Where a magnet is beyond the table of a field there are no answers.
         beyond = outputs.beyond()
@@ -384,8 +384,19 @@ class Results:
         )
 
 
-class _Outputs:
-    """The values of results."""
+class Outputs:
+    """The values of results.
+
+    Parameters
+    ----------
+    results : Results
+    program : Program
+    rest : MX
+        As of :meth:`Results.rest`.
+    speeds : MX (axes, places) or None
+        Velocities of a motion.
+    found : Stationarity
+    """
 
     def __init__(
         self, results: Results, program: Program, rest: ca.MX, speeds: ca.MX | None, found: Stationarity
@@ -759,7 +770,7 @@ class _Outputs:
         sides = [(p, i) for p in model.mesh.points for i, touching in enumerate(p.members) if touching == member]
         # Where elements end it pushes a place between them.
         inside = [(p, i) for p, i in sides if standing(model.mesh, p, i) is None]
-        pushes += [(self._place(p, i), (1.0 - 2.0 * i) * self._force_at(p)) for p, i in inside]
+        pushes += [(self.place(p, i), (1.0 - 2.0 * i) * self._force_at(p)) for p, i in inside]
         for place, force in pushes:
             push = force[: expressions.axes] / model.scales.force
             for i, (element, xi) in enumerate(zip(at.elements.tolist(), at.xi.tolist(), strict=True)):
@@ -852,13 +863,17 @@ class _Outputs:
         points = [point for point in self._model.mesh.points if point.contact == name]
         if key == "force":
             return sum((self._force_at(point).T for point in points), ca.MX.zeros(1, 3))
-        return self._place(points[0], 0) if len(points) == 1 else ca.MX(np.nan)
+        return self.place(points[0], 0) if len(points) == 1 else ca.MX(np.nan)
 
     def _force_at(self, point: ContactPoint) -> ca.MX:
         """Force (3,), N, at a place that touches on the first member."""
         return ca.vertcat(*[self._connection("contacts", point.name, f"force {axis}") for axis in "xyz"])
 
-    def _place(self, point: ContactPoint, side: int) -> ca.MX:
+    def push(self, point: ContactPoint) -> ca.MX:
+        """How hard a place that touches pushes, N."""
+        return self._connection("contacts", point.name, "push")
+
+    def place(self, point: ContactPoint, side: int) -> ca.MX:
         """Where a place that touches is on a member, a fraction of its length."""
         moved = self._connection("contacts", point.name, f"moved on {('first', 'second')[side]}")
         return point.at[side] + moved / self._lengths[point.members[side]]

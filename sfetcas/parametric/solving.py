@@ -245,7 +245,7 @@ class ParametricEquilibrium:
                 return answer
         solver, state = touching.anew(numbers)
         if solver not in touching.equilibria:
-            own = self if solver is self.solver else replace(self, solver=replace(solver, start=state))
+            own = self if solver is self.solver else replace(self, solver=replace(solver, start=state, begun=numbers))
             touching.equilibria[solver] = own
         of = touching.equilibria[solver]
         near = ParametricAnswer(of, numbers, Outcome(Code.SOLVED, state, 0.0, 0, 0))

@@ -5,7 +5,8 @@ energy on the closings remains.  Where the energy is not convex on them, which t
 matrix show (Sylvester), positive matrices replace those of the elements, and the diagonal is shifted until the signs
 are right; steps are shortened until potential and gaps fall.  Near the answer steps are taken whole.  Unstable
 equilibria are left along the lowest mode.  Loads without potential, and cases in which no minimum is found, are
-followed from zero loads.  What touches is no minimum in where it does: there Newton's steps go on from a state given.
+followed from zero loads.  Where something touches nothing is least in where it does: whole steps begin at a known
+equilibrium, and where they fail what is given becomes another little by little.
 From an equilibrium for other values Newton's whole steps are tried first.
 
 Every operation on numbers is one of the functions of :class:`~sfetcas.solvers.program.Program`; generated C takes the
@@ -41,6 +42,7 @@ class Code(enum.IntEnum):
     STALLED = 3
     NOT_FINITE = 4
     BAD_ARGUMENT = 5
+    TOUCHES = 6
 
 
 MEANINGS = {
@@ -49,6 +51,7 @@ MEANINGS = {
     Code.ITERATIONS: "no equilibrium within the iterations allowed",
     Code.STALLED: "no equilibrium: no step led further",
     Code.NOT_FINITE: "no equilibrium, or a result of it is not finite: the numbers left what can be computed",
+    Code.TOUCHES: "no equilibrium with what touches for the arguments of the scene: something else does",
     Code.BAD_ARGUMENT: "an argument or the start is not a finite number, or an argument outside of its range",
 }
 """A sentence for each code."""
@@ -186,6 +189,8 @@ class Globalised:
     weight : ndarray (rotation unknowns,)
         See :class:`~sfetcas.solvers.stability.StabilityTest`.
     rules : Rules, optional
+    begun : (ndarray (given,), ndarray (states,)), optional
+        What is given at an equilibrium, and its state, from which others are followed; by default they are from zero.
 
     Attributes
     ----------
@@ -196,8 +201,14 @@ class Globalised:
         Positions of the diagonal among the entries of the matrix.
     """
 
-    def __init__(self, program: Program, weight: Array, rules: Rules | None = None) -> None:
-        self.program, self.rules = program, rules or Rules()
+    def __init__(
+        self,
+        program: Program,
+        weight: Array,
+        rules: Rules | None = None,
+        begun: tuple[Array, Array] | None = None,
+    ) -> None:
+        self.program, self.rules, self.begun = program, rules or Rules(), begun
         equations = program.equations
         self._rotation_unknowns, self._unknowns, self._total = (
             equations.rotation_unknowns,
@@ -219,7 +230,7 @@ class Globalised:
         # Large vectors stay in CasADi's type between functions: conversion costs more than most of these calls.
         self._made_firm = self._firmness()
         self._symmetric = program.model.has_potential
-        self._sliding, self._followable = program.model.mesh.sliding, not program.model.mesh.points
+        self._sliding = program.model.mesh.sliding
         if self._symmetric and self._total:
             self._solver = ca.Linsol("globalised", "ldl", program.sparsity)
             self._solver.sfact(ca.DM(program.sparsity, 1.0))
@@ -331,9 +342,11 @@ class Globalised:
         state = program.begin(whole) if start is None else program.hold(start, whole)
         found = self._near(state, whole) if warm else None
         found = found or self._from(state, whole)
-        if found.code not in (Code.SOLVED, Code.UNSTABLE) and self._left and self._followable:
+        if found.code not in (Code.SOLVED, Code.UNSTABLE) and self._left:
             followed = self._followed(given)
             found = followed if followed.code is Code.SOLVED else found
+        if found.code is Code.SOLVED and found.negative > 0 and program.model.minimisable:
+            found = replace(found, code=Code.UNSTABLE)
         if found.code in (Code.SOLVED, Code.UNSTABLE) and not np.isfinite(found.state).all():
             found = replace(found, code=Code.NOT_FINITE)
         return replace(found, iterations=rules.iterations - self._left)
@@ -350,11 +363,8 @@ class Globalised:
 
     def _from(self, state: ca.DM, given: ca.DM) -> Outcome:
         """Downhill from a state to an equilibrium, and on from unstable ones, ``escapes`` times."""
-        model = self.program.model
-        if not model.downhill:
-            found = self._corrected(self._at(state, given), given, self._left)
-            unstable = model.minimisable and found.code is Code.SOLVED and found.negative > 0
-            return replace(found, code=Code.UNSTABLE) if unstable else found
+        if not self.program.model.downhill:
+            return self._corrected(self._at(state, given), given, self._left)
         for _ in range(self.rules.escapes + 1):
             found = self._descended(self._at(state, given), given)
             if found.code is not Code.SOLVED or found.negative <= 0:
@@ -445,15 +455,16 @@ class Globalised:
     # -- loads that grow ------------------------------------------------------------------------------
 
     def _followed(self, given: Array) -> Outcome:
-        """The equilibrium that is reached as the loads grow from zero."""
+        """The equilibrium that is reached as the loads grow from zero, or what is given becomes another."""
         program, rules = self.program, self.rules
-        share, reached, step = 0.0, program.begin(self._shared(given, 0.0)), 1.0
+        begin = program.begin(self._shared(given, 0.0)) if self.begun is None else ca.DM(self.begun[1])
+        share, reached, step = 0.0, begin, 1.0
         found = None
         while share < 1.0 and self._left:
             there = min(1.0, share + step)
             loads = self._shared(given, there)
-            begin = program.hold(reached, loads)
-            found = self._corrected(self._at(begin, loads), loads, rules.corrections)
+            there_begun = program.hold(reached, loads)
+            found = self._corrected(self._at(there_begun, loads), loads, rules.corrections)
             if found.code is Code.SOLVED:
                 share, reached, step = there, ca.DM(found.state), 2.0 * step
                 continue
@@ -462,12 +473,14 @@ class Globalised:
                 return found
         if found is None or share < 1.0:
             return Outcome(Code.ITERATIONS, _flat(reached), np.inf, NOT_DEFINED, 0)
-        if found.negative > 0 and rules.escapes and program.model.minimisable:
+        if found.negative > 0 and rules.escapes and program.model.downhill:
             return self._from(self._nudged(reached, ca.DM(given)), ca.DM(given))
         return found
 
     def _shared(self, given: Array, share: float) -> ca.DM:
-        """The vector of what is given with a share of all loads and motions; data are not scaled."""
+        """What is given with a share of all loads and motions, but for data; or on the way to it from the start."""
+        if self.begun is not None:
+            return ca.DM(self.begun[0] + share * (given - self.begun[0]))
         loads = self.program.slice_of_loads
         return ca.DM(np.concatenate([given[: loads.start], share * given[loads]]))
 

@@ -55,7 +55,7 @@ static void sf_copy(double *to, const double *from, int n) {
   for (i = 0; i < n; ++i) to[i] = from[i];
 }
 
-#if SF_MINIMISABLE
+#if SF_DOWNHILL
 static double sf_dot(const double *a, const double *b, int n) {
   double found = 0.0;
   int i;
@@ -84,7 +84,7 @@ static void sf_at(sf_run *run, sf_here *here) {
   @name@_at(m->arg, m->res, m->iw, m->w, 0);
 }
 
-#if SF_MINIMISABLE
+#if SF_DOWNHILL
 static void sf_merit(sf_run *run, const double *state, double *potential, double *gaps) {
   @name@_memory *m = run->m;
   m->arg[0] = state;
@@ -119,7 +119,8 @@ static int sf_factor(sf_run *run, const double *entries, double firm) {
     if (m->pivots[i] == 0.0) return SF_FAILED;
     negative += m->pivots[i] < 0.0;
   }
-  return negative - (SF_TOTAL - SF_UNKNOWNS);
+  /* Nor are places that slide along what they touch, in which nothing is least, counted. */
+  return negative - (SF_TOTAL - SF_UNKNOWNS) - SF_SLIDING;
 #else
   return negative;
 #endif
@@ -170,7 +171,7 @@ static int sf_newton(sf_run *run, const sf_here *here, int *negative) {
   return *negative != SF_FAILED && sf_solved(run, run->m->b);
 }
 
-#if SF_MINIMISABLE
+#if SF_DOWNHILL
 /* A step downhill by a positive matrix, as firm as it takes. */
 static int sf_downwards(sf_run *run, const sf_here *here) {
   @name@_memory *m = run->m;
@@ -329,7 +330,7 @@ static int sf_near(sf_run *run, sf_here *here, sf_here *there, int *negative, in
 #if SF_MINIMISABLE
   if (*negative > 0) {
     *status = @NAME@_UNSTABLE;
-    return SF_ESCAPES == 0;
+    return SF_ESCAPES == 0 || !SF_DOWNHILL;
   }
 #endif
   return 1;
@@ -337,7 +338,7 @@ static int sf_near(sf_run *run, sf_here *here, sf_here *there, int *negative, in
 
 /* Downhill from a state, and out of what is unstable. */
 static int sf_from(sf_run *run, sf_here *here, sf_here *there, int *negative) {
-#if SF_MINIMISABLE
+#if SF_DOWNHILL
   int escape;
   for (escape = 0; escape <= SF_ESCAPES; ++escape) {
     int status = sf_descended(run, here, there, negative);
@@ -350,19 +351,33 @@ static int sf_from(sf_run *run, sf_here *here, sf_here *there, int *negative) {
 #endif
 }
 
-/* Where the loads lead, growing from zero. */
+/* What is given with a share of the loads, or on the way from what it was at the start. */
+static void sf_shared(sf_run *run, const double *given, double share) {
+  double *shared = run->m->shared;
+  int i;
+#if SF_BEGUN
+  for (i = 0; i < SF_GIVEN; ++i) shared[i] = sf_begun[i] + share * (given[i] - sf_begun[i]);
+#else
+  for (i = 0; i < SF_LOADS; ++i) shared[i] = given[i];
+  for (i = SF_LOADS; i < SF_GIVEN; ++i) shared[i] = share * given[i];
+#endif
+}
+
+/* Where the loads lead, growing from zero, or what is given as it becomes another. */
 static int sf_followed(sf_run *run, sf_here *here, sf_here *there, int *negative) {
   @name@_memory *m = run->m;
   const double *given = run->given;
   double share = 0.0, step = 1.0;
-  int i, status = @NAME@_ITERATIONS;
+  int status = @NAME@_ITERATIONS;
   run->given = m->shared;
-  sf_copy(m->shared, given, SF_GIVEN);
-  for (i = SF_LOADS; i < SF_GIVEN; ++i) m->shared[i] = 0.0 * given[i];
-  sf_call(m, @name@_begin, m->shared, 0, 0, m->reached);
+  sf_shared(run, given, 0.0);
+  if (SF_BEGUN)
+    sf_copy(m->reached, sf_start, SF_STATE);
+  else
+    sf_call(m, @name@_begin, m->shared, 0, 0, m->reached);
   while (share < 1.0 && run->left) {
     double next = share + step < 1.0 ? share + step : 1.0;
-    for (i = SF_LOADS; i < SF_GIVEN; ++i) m->shared[i] = next * given[i];
+    sf_shared(run, given, next);
     sf_call(m, @name@_hold, m->reached, m->shared, 0, here->state);
     status = sf_corrected(run, here, there, SF_CORRECTIONS, negative);
     if (status == @NAME@_SOLVED) {
@@ -376,7 +391,7 @@ static int sf_followed(sf_run *run, sf_here *here, sf_here *there, int *negative
   }
   run->given = given;
   if (share < 1.0) return status == @NAME@_SOLVED ? @NAME@_ITERATIONS : status;
-#if SF_MINIMISABLE
+#if SF_DOWNHILL
   if (*negative > 0 && SF_ESCAPES > 0) {
     sf_nudged(run, here, there);
     return sf_from(run, here, there, negative);
@@ -435,6 +450,7 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
       }
     }
   }
+  if (SF_MINIMISABLE && status == @NAME@_SOLVED && negative > 0) status = @NAME@_UNSTABLE;
   if ((status == @NAME@_SOLVED || status == @NAME@_UNSTABLE) && !sf_all_finite(here.state, SF_STATE))
     status = @NAME@_NOT_FINITE;
   if (results && (status == @NAME@_SOLVED || status == @NAME@_UNSTABLE) &&
@@ -444,6 +460,15 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
     sf_none(results, @NAME@_RESULTS);
     status = @NAME@_NOT_FINITE;
   }
+#if SF_MARGINS
+  if (status == @NAME@_SOLVED || status == @NAME@_UNSTABLE) {
+    int i;
+    sf_call(m, @name@_margins, arguments, here.state, m->given, m->margins);
+    for (i = 0; i < SF_MARGINS; ++i)
+      if (!(m->margins[i] >= SF_LEAST)) status = @NAME@_TOUCHES;
+    if (results && status == @NAME@_TOUCHES) sf_none(results, @NAME@_RESULTS);
+  }
+#endif
   if (report) {
     report->status = status;
     report->iterations = SF_ITERATIONS - run.left;

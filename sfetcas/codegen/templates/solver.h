@@ -37,7 +37,7 @@ typedef struct {
   double states[2][@sz_state@], reached[@sz_state@], kept[@sz_state@];
   double residuals[2][@sz_total@], b[@sz_total@], x[@sz_total@], y[@sz_total@], rest[@sz_total@], step[@sz_total@];
   double matrices[2][@sz_entries@], positive[@sz_entries@], target[@sz_entries@], matrix[@sz_entries@];
-  double lower[@sz_lower@], pivots[@sz_total@];
+  double lower[@sz_lower@], pivots[@sz_total@];@margins_declared@
 } @name@_memory;
 
 typedef struct {

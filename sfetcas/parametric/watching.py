@@ -1,0 +1,137 @@
+"""What is looked at where what touches is not found anew, as in generated code: whether the same touches.
+
+Margins, dimensionless, are below zero where something else touches: how hard each place pushes, how far it is from the
+ends of its member, and gaps of members from obstacles at places along them.  Between three of these the least gap is
+that of a parabola.  Near a place that touches there is no other margin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from ..description.answers import answer_name
+from ..description.obstacles import members_of
+from ..errors import SceneError
+from ..mechanics.model import Model
+from .arguments import Argument, Arguments
+from .results import Outputs, Results
+
+__all__ = ["LEAST", "margins_of"]
+
+LEAST = -1e-5
+"""Margin from which on something else touches: parabolas miss gaps by less than that of the size of the scene."""
+
+SAMPLES = 65
+"""Places along a member at which its gaps are looked at."""
+
+BESIDE = 3.0
+"""Distance from a place that touches, over that between such places, within which a gap is not looked at."""
+
+FAR = 1.0
+"""The margin of what is not looked at; that of what does not hold at all is as far below zero."""
+
+NO_PUSH = 1e-12
+"""A push, dimensionless, that is none: without one a place may be anywhere on a surface that its member crosses."""
+
+
+def margins_of(name: str, base: Model, arguments: Sequence[Argument]) -> ca.Function:
+    """``(arguments, state, given) ->`` margins (n,).
+
+    Parameters
+    ----------
+    name : str
+        Of the function.
+    base : Model
+        With its places that touch.
+    arguments : sequence of Argument
+
+    Raises
+    ------
+    SceneError
+        Contacts whose margins are not known.
+    """
+    _refuse(base, arguments)
+    scene, points = base.scene, base.mesh.points
+    x = np.linspace(0.0, 1.0, SAMPLES)
+    near = {
+        (contact, member): [x[0], x[-1]] if scene.members[member].type == "rigid" else x.tolist()
+        for contact, record in scene.contacts.items()
+        for member in members_of(record, scene.members)
+    }
+    flexible = dict.fromkeys(member for (_, member), at in near.items() if len(at) > 2)
+    names = [f"members.{member}.position" for member in flexible]
+    ends = dict.fromkeys(
+        node for (_, member), at in near.items() if len(at) == 2 for node in scene.members[member].nodes
+    )
+    names += [f"nodes.{node}.position" for node in ends]
+    results = Results(base, names, dict.fromkeys(flexible, tuple(x.tolist())))
+    known = Arguments(scene, base, arguments, results, needed=False)
+    program, p = known.program, ca.MX.sym("arguments", len(known.defaults))
+    outputs = Outputs(results, program, known.undeformed(p), None, program.stationarity)
+    positions = {member: outputs.value(answer_name(f"members.{member}.position")) for member in flexible}
+    pushes = [outputs.push(point) / base.scales.force for point in points]
+    found = [ca.if_else(push > NO_PUSH, push, -FAR) for push in pushes]
+    places = [(point, outputs.place(point, 0)) for point in points]
+    found += [end for point, at in places if any(point.slides) for end in (at, 1.0 - at)]
+    for (contact, member), at in near.items():
+        here = positions.get(member)
+        if here is None:
+            nodes = scene.members[member].nodes
+            here = ca.vertcat(*(outputs.value(answer_name(f"nodes.{node}.position")) for node in nodes))
+        gaps = _gaps(base, contact, here) / scene.size
+        gaps = _least(gaps) if len(at) > 2 else gaps
+        for touched in (place for point, place in places if point.pair == (contact, (member,))):
+            gaps = ca.if_else(ca.fabs(ca.DM(at) - touched) <= BESIDE / (SAMPLES - 1), FAR, gaps)
+        found.append(gaps)
+    margins = ca.densify(ca.vertcat(*found))
+    return ca.Function(
+        name, [p, program.state_symbol, program.symbol], [margins], ["arguments", "state", "given"], ["margins"]
+    )
+
+
+def _refuse(base: Model, arguments: Sequence[Argument]) -> None:
+    """Refuse contacts and arguments of which it cannot be told whether the same touches."""
+    scene = base.scene
+    for name, contact in scene.contacts.items():
+        what = "members that touch each other" if contact.between_members else ""
+        what = what or ("an obstacle that a node carries" if contact.node is not None else "")
+        what = what or ("an edge without member_radius" if scene.obstacles[name].kind == "sharp" else "")
+        curved = [
+            m
+            for m in members_of(contact, scene.members)
+            if scene.members[m].type == "rigid" and scene.center_lines[m].turning
+        ]
+        what = what or (f"the curved rigid member {curved[0]!r}" if curved else "")
+        if what:
+            message = (
+                f"found {what}, which is not exported, accepted: planes and what is round, that stay, with flexible"
+            )
+            raise SceneError(f"{message} or straight members", ("contacts", name))
+    for one in arguments:
+        if one.name.startswith("contacts.") or one.numbers is not None:
+            message = "found a number of an obstacle, or one that others follow, accepted beside contact: numbers of"
+            raise SceneError(f"{message} loads, motions, members and nodes", ("arguments", one.name))
+
+
+def _gaps(base: Model, contact: str, here: ca.MX) -> ca.MX:
+    """Gaps (n,), m, of positions (n, 3) from an obstacle."""
+    stop, n = base.scene.obstacles[contact], here.shape[0]
+    out = here - ca.repmat(ca.DM(stop.place).T, n, 1)
+    if stop.kind == "flat":
+        distance = ca.mtimes(out, ca.DM(stop.normal))
+    else:
+        across = ca.mtimes(out, ca.DM(stop.across))
+        distance = stop.sign * (ca.sqrt(ca.sum2(across**2)) - stop.radius)
+    return distance - base.scene.contacts[contact].member_radius
+
+
+def _least(gaps: ca.MX) -> ca.MX:
+    """Gaps (n,) at places, in whose middle those that are less than both beside them are as little as a parabola."""
+    before, here, after = gaps[:-2], gaps[1:-1], gaps[2:]
+    bend, slope = before - 2.0 * here + after, after - before
+    lowest = ca.logic_and(here <= before, here <= after)
+    inner = ca.if_else(ca.logic_and(lowest, bend > 0.0), here - slope**2 / (8.0 * ca.fmax(bend, 1e-300)), here)
+    return ca.vertcat(gaps[0], inner, gaps[-1])

@@ -1,0 +1,107 @@
+"""Generated C of scenes in which members touch something: the same touches, or a status says that it does not."""
+
+import ctypes
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from test_codegen import built, needs_compiler, said
+from test_contact_design import DRUM, FLOOR, pressed, two
+
+from sfetcas import SceneError, export, solve
+from sfetcas.parametric.equilibrium import equilibrium_solver
+from sfetcas.solvers.globalised import Code
+
+LOADS = {"arguments": ["loads.F.value"]}
+
+
+def solver_of(scene, **more):
+    return equilibrium_solver(scene, "c", touching=True, watched=True, **more)
+
+
+def test_status_says_whether_the_same_touches():
+    scene = two()
+    found, wanted = [], []
+    solver, near = solver_of(scene, **LOADS), None
+    for load in np.linspace(0.2, -8.0, 7):
+        outcome, results = solver.solve(np.array([0.0, load]), near)
+        near = outcome.state if outcome.code is Code.SOLVED else near
+        found.append(outcome.code is Code.SOLVED)
+        assert outcome.code in (Code.SOLVED, Code.TOUCHES)
+        step = solve(scene.replace({"loads.F.value": [0, float(load)]})).last
+        wanted.append([entry["at"] is not None for entry in step.contacts.values()] == [True, False])
+        if found[-1]:
+            # Places are within elements of the mesh of the first loads.
+            position = solver.by_name(results)["nodes.B.position"]
+            assert position == pytest.approx(step.position("B"), abs=2e-5)
+        else:
+            assert np.isnan(results).all()
+    assert found == wanted
+    assert 1 < sum(wanted) < 6
+
+
+def test_place_that_comes_to_the_end_of_its_member_is_another_one():
+    scene = pressed({"c": DRUM})
+    solver, codes = solver_of(scene, arguments=["nodes.B.position.0"]), []
+    for length in (1.0, 0.9, 0.8, 0.76, 0.7):
+        codes.append(solver.solve(np.array([length]))[0].code)
+        at = solve(scene.replace({"nodes.B.position": [length, 0]})).last.contacts["c"]["at"]
+        assert codes[-1] is (Code.SOLVED if at is not None and at < 1.0 else Code.TOUCHES)
+    assert codes[0] is Code.SOLVED
+    assert codes[-1] is Code.TOUCHES
+
+
+@needs_compiler
+def test_c_has_the_bits_of_the_process(tmp_path):
+    scene = pressed({"c": DRUM})
+    made = export(scene, tmp_path / "c", **LOADS)
+    said(built(tmp_path / "c", "structure"))
+    subprocess.run(["make", "CC=gcc", "-s"], cwd=tmp_path / "c", check=True)
+    library = ctypes.CDLL(
+        str(tmp_path / "c" / ("libstructure.dylib" if sys.platform == "darwin" else "libstructure.so"))
+    )
+    doubles = ctypes.POINTER(ctypes.c_double)
+    memory = ctypes.create_string_buffer(10_000_000)
+    codes = []
+    for load in ([0.0, -2.0], [0.3, -2.5], [0.0, -1.0], [0.0, 1.0]):
+        outcome, results = made.solve(np.array(load))
+        given, state, there = np.array(load), np.zeros(made.method.program.states), np.zeros(made.results.size)
+        pointers = [x.ctypes.data_as(doubles) for x in (given, state, there)]
+        code = library.structure_solve(memory, pointers[0], pointers[1], 0, pointers[2], None)
+        codes.append(Code(code))
+        assert code == outcome.code
+        np.testing.assert_array_equal(there, results)
+    assert codes == [Code.SOLVED, Code.SOLVED, Code.TOUCHES, Code.TOUCHES]
+    assert "STRUCTURE_TOUCHES = 6" in (tmp_path / "c" / "structure.h").read_text()
+
+
+def test_what_does_not_touch_is_looked_at_too():
+    scene = pressed({"c": {**FLOOR, "point": [0, -1.2]}}, load=(0, -0.5))
+    solver = solver_of(scene, **LOADS)
+    assert solver.solve()[0].code is Code.SOLVED
+    # From 0.9 on the tip would be below the floor, whatever the load.
+    low = pressed({"c": {**FLOOR, "point": [0, -0.3]}}, load=(0, -0.5))
+    assert [solver_of(low, **LOADS).solve(np.array([0.0, y]))[0].code for y in (-0.9, -1.1)] == [
+        Code.SOLVED,
+        Code.TOUCHES,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("contacts", "more", "given", "sentence"),
+    [
+        (
+            {"c": DRUM},
+            {},
+            {"arguments": ["contacts.c.radius"]},
+            "arguments.contacts.c.radius: found a number of an obst",
+        ),
+        ({"c": {"type": "point", "position": [0.6, -0.1], "side": [0, 1]}}, {}, {}, "an edge without member_radius"),
+        ({"c": {**FLOOR, "friction": 0.2}}, {}, {}, "what sticks and slides depends on the steps before, and is not"),
+    ],
+    ids=["number", "edge", "friction"],
+)
+def test_refused(contacts, more, given, sentence, tmp_path):
+    with pytest.raises(SceneError, match=sentence):
+        export(pressed(contacts, **more), tmp_path / "c", **given)
