@@ -64,7 +64,7 @@ def test_c_has_the_bits_of_the_process(tmp_path):
     doubles = ctypes.POINTER(ctypes.c_double)
     memory = ctypes.create_string_buffer(10_000_000)
     codes = []
-    for load in ([0.0, -2.0], [0.3, -2.5], [0.0, -1.0], [0.0, 1.0]):
+    for load in ([0.0, -2.0], [0.3, -2.5], [0.0, -1.0], [0.0, 1.0], [-10.0, -20.0]):
         outcome, results = made.solve(np.array(load))
         given, state, there = np.array(load), np.zeros(made.method.program.states), np.zeros(made.results.size)
         pointers = [x.ctypes.data_as(doubles) for x in (given, state, there)]
@@ -72,7 +72,8 @@ def test_c_has_the_bits_of_the_process(tmp_path):
         codes.append(Code(code))
         assert code == outcome.code
         np.testing.assert_array_equal(there, results)
-    assert codes == [Code.SOLVED, Code.SOLVED, Code.TOUCHES, Code.TOUCHES]
+    # The last one is followed from the first.
+    assert codes == [Code.SOLVED, Code.SOLVED, Code.TOUCHES, Code.TOUCHES, Code.SOLVED]
     assert "STRUCTURE_TOUCHES = 6" in (tmp_path / "c" / "structure.h").read_text()
 
 
