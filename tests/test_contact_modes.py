@@ -105,6 +105,29 @@ def test_place_that_sticks_is_a_hinge():
     assert modes.omega == pytest.approx(held.omega, rel=1e-7)
 
 
+def test_bead_in_a_hole_is_a_pendulum():
+    nodes = {"A": {"position": [0, -0.7], "mass": 2.0}, "B": {"position": [0, -0.6], "mass": 1e-9}}
+    parts = table({"type": "circle", "center": [0, 0], "radius": 0.7, "side": "inside"}, modes=1, loads={}, nodes=nodes)
+    parts |= {"sections": {}, "members": {"bar": {"nodes": ["A", "B"], "type": "rigid"}}, "gravity": [0, -9.81]}
+    # The other end, at rest above the first one, falls.
+    assert solve(Scene.from_dict(parts)).omega == pytest.approx([np.sqrt(9.81 / 0.7)], rel=1e-8)
+
+
+@pytest.mark.parametrize(("kind", "friction"), [("rigid", 0.0), ("rigid", 0.5), ("flexible", 0.0)])
+def test_what_lies_as_a_whole_slides_or_sticks(kind, friction):
+    bar = {"nodes": ["A", "B"], "type": kind} | ({"section": "s"} if kind == "flexible" else {})
+    mass = {"mass": 1.0} if kind == "rigid" else {}
+    floor = {"type": "plane", "point": [0, 0], "normal": [0, 1], "friction": friction}
+    parts = table(floor, loads={}, accuracy=1e-6, members={"bar": bar}, gravity=[0, -9.81])
+    parts["sections"]["s"]["rhoA"] = 2.0
+    parts["nodes"] = {"A": {"position": [0, 0], **mass}, "B": {"position": [1, 0], **mass}}
+    parts["springs"] = {"k": {"type": "translational", "node": "A", "direction": [1, 0], "stiffness": 8.0}}
+    modes = solve(Scene.from_dict(parts))
+    assert modes.omega == pytest.approx([] if friction else [2.0], rel=1e-8)
+    assert f"{1 - bool(friction)} modes found" in modes.notes[0]
+    assert modes.status is Status.SOLVED
+
+
 # -- statics beside it ----------------------------------------------------------------------------------------
 
 SPACE = {"sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8, "rhoA": 1.0}}, "dimension": "space"}

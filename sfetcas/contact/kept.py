@@ -86,6 +86,11 @@ class Kept:
         self.single = tuple(sorted(single, key=lambda point: (point.contact, point.members, point.at)))
         self.stretches = run.lines.stretches(rest)
 
+    @property
+    def sticks(self) -> bool:
+        """Whether there are places that stick."""
+        return any(point.grip is not None for point in self.single)
+
     # -- on another mesh --------------------------------------------------------------------------
 
     def cuts(self) -> dict[str, Array]:

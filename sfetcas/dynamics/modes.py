@@ -74,6 +74,14 @@ HALVINGS = 7
 MOST_ELEMENTS = 4000
 """A mesh that is halved does not grow beyond this."""
 
+GROWN = 0.3
+"""Change of a frequency by which it is none of the structure: those of elements grow by three quarters as these are
+halved.
+"""
+
+YIELDS = 1e5
+"""Exponent, dimensionless, from which on it is that of what sticks and hardly gives way: about 1e6."""
+
 ENDS = 6
 """Times that ends of lines are moved on a mesh, at most: each time the error is about squared."""
 
@@ -372,15 +380,31 @@ class ModalAnalysis:
                 error = 0.0
                 break
             other = self._found(finer)
-            last, error = error, _difference(found, other[1])
+            last, error, coarse = error, _difference(found, other[1]), found
             # What gets no nearer is rounding: the coarser mesh has less of it.
             if prescribed or error > last:
                 break
             mesh, found, answer = other[0].model.mesh, other[1], other
             if error <= self.accuracy or 2 * mesh.elements > MOST_ELEMENTS:
                 break
+        if self.kept is not None and GROWN < error < np.inf:
+            answer, error = self._of_structure(coarse, other[1], answer)
         self.seconds["solve"] += time.perf_counter() - begin
         return self._answered(*answer, error)
+
+    @staticmethod
+    def _of_structure(
+        coarse: Eigenmotions, fine: Eigenmotions, answer: tuple[SmallMotion, Eigenmotions]
+    ) -> tuple[tuple[SmallMotion, Eigenmotions], float]:
+        """The motions that there are whatever the mesh, and their largest difference: elements that lie along an
+        obstacle have motions of their own within them, whose frequencies grow as elements are halved.
+        """
+        count = min(len(coarse.exponents), len(fine.exponents))
+        changes = np.abs(coarse.exponents[:count] / fine.exponents[:count] - 1.0)
+        count = int(np.argmax(changes > GROWN)) if (changes > GROWN).any() else count
+        motion, found = answer
+        kept = replace(found, exponents=found.exponents[:count], shapes=found.shapes[:, :count])
+        return (motion, kept), float(changes[:count].max(initial=0.0))
 
     def _found(self, mesh: Mesh) -> tuple[SmallMotion, Eigenmotions]:
         rest = self._put_on(mesh)
@@ -389,7 +413,11 @@ class ModalAnalysis:
         try:
             # One more: of those with the frequency of the last one that is asked for a rule takes the shape.
             more = int(motion.plain and motion.symmetric)
-            return motion, _by_rule(motion, motion.eigenmotions(self.count + more, negative), self.count)
+            found = motion.eigenmotions(self.count + more, negative)
+            if self.kept is not None and self.kept.sticks:
+                slow = np.abs(found.exponents) < YIELDS
+                found = replace(found, exponents=found.exponents[slow], shapes=found.shapes[:, slow])
+            return motion, _by_rule(motion, found, self.count)
         except np.linalg.LinAlgError as error:
             raise SolveError(Status.FAILED, f"the frequencies could not be found: {error}", rest.state) from None
 
