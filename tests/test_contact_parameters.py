@@ -65,7 +65,7 @@ PLACE = ["nodes.B.position", "contacts.c.force", "contacts.c.at", "reactions.A.m
     [
         (
             table(DRUM),
-            ["loads.F.value", "contacts.c.center", "sections.s.EI3", "nodes.B.position.0"],
+            ["contacts.c.center.1", "sections.s.EI3", "nodes.B.position.0"],
         ),
         (table({**DRUM, "member_radius": 0.02}), ["contacts.c.member_radius"]),
         (table(EDGE), ["contacts.c.position", "loads.F.value"]),
@@ -130,7 +130,7 @@ def test_what_touches_is_found_anew_where_it_is_something_else():
     names = ["nodes.B.position", "contacts.c.force", "contacts.d.force"]
     function = parametric(two(), ["loads.F.value"], names)
     last, counts = function.solve(), []
-    for load in ([0, -2], [0, -5], [0, -8], [0, 1], [0, -0.1], [0, -4]):
+    for load in ([0, -5], [0, -8], [0, 1], [0, -4]):
         last = function.solve({"loads.F.value": load}, last)
         wanted = told(function.scene_at(last.values), names)
         found = np.concatenate([last[name] for name in names])
@@ -138,7 +138,9 @@ def test_what_touches_is_found_anew_where_it_is_something_else():
         assert found == pytest.approx(wanted, abs=1e-4 * max(1.0, np.abs(wanted).max()))
         counts.append(len(last.of.solver.model.mesh.points))
         assert last.jacobian["nodes.B.position"]["loads.F.value"][1, 1] > 0.0
-    assert counts == [1, 2, 2, 0, 0, 1]
+    assert counts == [2, 2, 0, 1]
+    # Where a place has begun elsewhere along its member is known: else it takes five.
+    assert last.outcome.iterations <= 4
     # The same is no other solver.
     assert len(function.touching.equilibria) == 3
 
