@@ -8,6 +8,7 @@ are interpolated instead.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -118,7 +119,8 @@ class Sampler:
 
     def at(self, t: float) -> Sample:
         """The sample at a time within the steps that are there."""
-        return _within(self._steps, self._stages, t)
+        steps = self._steps
+        return _begun(_within(steps, self._stages, _number(steps, t), t).sample(t), steps[0])
 
 
 class StepRecord:
@@ -137,9 +139,12 @@ class StepRecord:
         # Each piece is smooth; the steps of one piece are numbered from 1.
         self._pieces: list[list[Taken]] = []
         self._number, self._every, self._bytes = 0, 1, 0
+        # Of the step that was asked for last: many times lie in each.
+        self._kept: _Polynomial | None = None
 
     def feed(self, taken: Taken) -> None:
         """Keep a further step."""
+        self._kept = None
         if taken.begin.last is None:
             self._pieces.append([])
             self._number = 0
@@ -163,9 +168,13 @@ class StepRecord:
 
     def sample(self, t: float) -> Sample:
         """The state at a dimensionless time between the first and the last of :attr:`times`."""
-        ends = [steps[-1].after.t for steps in self._pieces]
-        piece = min(int(np.searchsorted(ends, t * (1.0 - 1e-14))), len(ends) - 1)
-        return _within(self._pieces[piece], self._stages, t, whole=True)
+        last = [steps[-1] for steps in self._pieces]
+        steps = self._pieces[_number(last, t)]
+        k = _number(steps, t)
+        if self._kept is None or self._kept.own is not steps[k]:
+            # Decided at the end of the step: samples are continuous within it.
+            self._kept = _within(steps, self._stages, k, steps[k].after.t)
+        return _begun(self._kept.sample(t), steps[0])
 
 
 ROOM = 2**25
@@ -186,81 +195,97 @@ def _bytes(taken: Taken) -> int:
     return sum(part.nbytes for part in (taken.turns, taken.shifts, taken.x, after.q, after.y, after.x, *more))
 
 
-def _within(steps: Sequence[Taken], stages: int, t: float, *, whole: bool = False) -> Sample:
-    """The sample at a time within smoothly connected steps.
-
-    Which polynomial is taken is decided at that time, or at the end for the ``whole`` step: then samples are
-    continuous within it.
-    """
-    ends = [taken.after.t for taken in steps]
-    k = min(int(np.searchsorted(ends, t * (1.0 - 1e-14))), len(ends) - 1)
-    if whole and t != ends[k]:
-        here, judged = (_polynomials(steps, stages, ends, k, at) for at in (t, ends[k]))
-        found = [(sample, doubt) for (sample, _), (_, doubt) in zip(here, judged, strict=True)]
-    else:
-        found = _polynomials(steps, stages, ends, k, t)
-    ends_only, doubt = found[0]
-    sample = ends_only if len(found) == 1 or doubt <= DOUBTFUL * found[1][1] else found[1][0]
-    if t != 0.0:
-        return sample
-    # How it begins is known; from rest nothing turns.
-    v = steps[0].begin.rates[0]
-    return replace(sample, v=v, spin=sample.spin if v.any() else np.zeros_like(sample.spin))
+def _number(steps: Sequence[Taken], t: float) -> int:
+    """Which of smoothly connected steps a time lies in."""
+    return min(bisect_left(steps, t * (1.0 - 1e-14), key=lambda taken: taken.after.t), len(steps) - 1)
 
 
-def _polynomials(
-    steps: Sequence[Taken], stages: int, ends: Sequence[float], k: int, t: float
-) -> list[tuple[Sample, float]]:
-    """The samples within a step by the ends of many steps, and by all stages of few, with their doubts."""
+def _within(steps: Sequence[Taken], stages: int, k: int, judged: float) -> _Polynomial:
+    """The polynomial of a step of many, by the ends of many or by all stages of few, which is decided at a time."""
     found = []
     for around, chosen in ((NODES, slice(-1, None)), (-(-NODES // stages), slice(0, None))):
-        if chosen.start == 0 or len(ends) >= NODES:
-            first = max(0, min(k - (around - 1) // 2, len(ends) - around))
-            last = min(first + around, len(ends))
+        if chosen.start == 0 or len(steps) >= NODES:
+            first = max(0, min(k - (around - 1) // 2, len(steps) - around))
+            last = min(first + around, len(steps))
             # Beside an event there may be steps so short that the polynomial through all is none of a longer one.
             while first < k and steps[first].h < UNEVEN * steps[k].h:
                 first += 1
             while last > k + 1 and steps[last - 1].h < UNEVEN * steps[k].h:
                 last -= 1
-            found.append(_interpolated(steps[first:last], steps[k], t, chosen if last - first > 1 else slice(0, None)))
-    return found
+            found.append(_through(steps[first:last], steps[k], chosen if last - first > 1 else slice(0, None)))
+    return found[0] if len(found) == 1 or found[0].doubt(judged) <= DOUBTFUL * found[1].doubt(judged) else found[1]
 
 
-def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -> tuple[Sample, float]:
-    """The sample between steps, of which the chosen stages count, and how much one node less changes it."""
+def _through(steps: Sequence[Taken], own: Taken, chosen: slice) -> _Polynomial:
+    """The polynomial through the begin of steps and their chosen stages, about one of the steps."""
     begin, h = own.begin, own.h
-    nodes, turns = [(steps[0].begin.t - begin.t) / h], []
+    at, turns = [(steps[0].begin.t - begin.t) / h], [_from(begin.q, steps[0].begin.q)]
     # Each step may be counted from an origin of its own.
     x = [steps[0].begin.x + steps[0].begin.origin[1]]
     y = [steps[0].begin.y + steps[0].begin.origin[0]]
-    turns.append(_from(begin.q, steps[0].begin.q))
     for taken in steps:
-        nodes += [(taken.begin.t - begin.t + c * taken.h) / h for c in taken.places[chosen]]
+        at += [(taken.begin.t - begin.t + c * taken.h) / h for c in taken.places[chosen]]
         x += list(taken.x[chosen] + taken.begin.origin[1])
         y += list(taken.begin.y + taken.shifts[chosen] + taken.begin.origin[0])
         turns += [_from(begin.q, turned_by(taken.begin.q, turn)) for turn in taken.turns[chosen]]
-    at, here = np.array(nodes), np.array([(t - begin.t) / h])
-    row = evaluation(at, here)
     middle = own.after.x + own.after.origin[1]
-    quantities = np.array(x) - middle
-    turn = np.einsum("n,nra->ra", row[0], np.array(turns))
-    q, slope = turned_by(begin.q, turn), np.einsum("n,nra->ra", (row @ differentiation(at))[0], np.array(turns)) / h
-    spin = slope if slope.shape[1] == 1 else quaternion.angular_velocity(turn, slope)
-    v, a = _rates(at, here, quantities)
-    # Without the node that is furthest.
-    near = np.delete(np.arange(len(at)), int(np.abs(at - here).argmax()))
-    doubt = np.abs(a - _rates(at[near], here, quantities[near])[1]).max(initial=0.0) if len(at) > 2 else 0.0
-    position = middle + (row @ quantities)[0]
-    given = (
-        own.after.unwrapped,
-        begin.remembered,
-        begin.acting,
-        begin.lost + _rubbed(own, float(here[0])),
-        begin.rubs,
-        begin.unilateral,
-    )
-    sample = Sample(t, q, (row @ np.array(y))[0], position, v / h, a / h**2, spin, *given)
-    return sample, float(doubt) / h**2
+    return _Polynomial(own, np.array(at), middle, np.array(x) - middle, np.array(y), np.array(turns))
+
+
+@dataclass(frozen=True, eq=False)
+class _Polynomial:
+    """A motion beside one of its time steps.
+
+    Attributes
+    ----------
+    own : Taken
+        The step.
+    at : ndarray (n,)
+        Its nodes, as shares of the step from its begin.
+    middle, x, y, turns : ndarray
+        Quantities at the end of the step, and at the nodes from there; displacements; rotation vectors from the begin.
+    """
+
+    own: Taken
+    at: Array
+    middle: Array
+    x: Array
+    y: Array
+    turns: Array
+
+    def sample(self, t: float) -> Sample:
+        """The state at a time."""
+        own, begin, h, here = self.own, self.own.begin, self.own.h, self._place(t)
+        row = evaluation(self.at, here)
+        turn = np.einsum("n,nra->ra", row[0], self.turns)
+        q, slope = turned_by(begin.q, turn), np.einsum("n,nra->ra", (row @ differentiation(self.at))[0], self.turns) / h
+        spin = slope if slope.shape[1] == 1 else quaternion.angular_velocity(turn, slope)
+        v, a = _rates(self.at, here, self.x)
+        lost = begin.lost + _rubbed(own, float(here[0]))
+        given = own.after.unwrapped, begin.remembered, begin.acting, lost, begin.rubs, begin.unilateral
+        position = self.middle + (row @ self.x)[0]
+        return Sample(t, q, (row @ self.y)[0], position, v / h, a / h**2, spin, *given)
+
+    def doubt(self, t: float) -> float:
+        """How much one node less changes accelerations at a time."""
+        if len(self.at) <= 2:
+            return 0.0
+        here = self._place(t)
+        # Without the node that is furthest.
+        near = np.delete(np.arange(len(self.at)), int(np.abs(self.at - here).argmax()))
+        change = _rates(self.at, here, self.x)[1] - _rates(self.at[near], here, self.x[near])[1]
+        return float(np.abs(change).max(initial=0.0)) / self.own.h**2
+
+    def _place(self, t: float) -> Array:
+        return np.array([(t - self.own.begin.t) / self.own.h])
+
+
+def _begun(sample: Sample, first: Taken) -> Sample:
+    """The sample, at time zero with what is known of how the first step begins: from rest nothing turns."""
+    if sample.t != 0.0:
+        return sample
+    v = first.begin.rates[0]
+    return replace(sample, v=v, spin=sample.spin if v.any() else np.zeros_like(sample.spin))
 
 
 def _rubbed(taken: Taken, share: float) -> float:
