@@ -283,7 +283,7 @@ class Closest:
             # What is straight and rigid is nearest to a plane with an end.
             ends = pair.stop is not None and pair.stop.kind == "flat" and self.stiff(member)
             places = x[member][[0, -1]] if ends else x[member]
-            gaps = self._gaps(fields, pair, places)[0]
+            gaps, _ = self._gaps(fields, pair, places)
             padded = np.concatenate([[np.inf], gaps, [np.inf]])
             # Of a member that lies along a plane rounding shall not make a minimum of each sample.
             rounding = max(ALIKE * np.abs(gaps).max(), tolerances.DECIMAL * self.scene.size)
@@ -296,7 +296,7 @@ class Closest:
             i = np.flatnonzero(least)
             low, high = places[np.maximum(i - 1, 0)], places[np.minimum(i + 1, len(places) - 1)]
             at = places[i] if ends else self._least(fields, pair, low, places[i], high)
-            gaps, normals, *_ = self._gaps(fields, pair, at)
+            gaps, normals = self._gaps(fields, pair, at)
             found += self._once(pair, at, gaps, normals, reach, nodes)
         return found
 
@@ -334,7 +334,7 @@ class Closest:
             i = np.flatnonzero(before[:-1] & ~before[1:])
             low, high = x[i], x[i + 1]
             at = self._least(fields, pair, low, low - slope[i] / (slope[i + 1] - slope[i]) * (high - low), high)
-            known[pair.key] = (at, *self._gaps(fields, pair, at)[:2])
+            known[pair.key] = (at, *self._gaps(fields, pair, at))
         return known[pair.key]
 
     def _over_edge(self, fields: Fields, pair: Pair, reach: float, nodes: set[tuple[str, str]]) -> Iterator[Near]:
@@ -351,7 +351,7 @@ class Closest:
         """Places (n,) of the minima between others."""
         (member,) = pair.members
         for _ in range(ITERATIONS):
-            _, _, slope, curvature = self._gaps(fields, pair, at)
+            slope, curvature = self._slopes(fields, pair, at)
             low, high = np.where(slope < 0.0, at, low), np.where(slope > 0.0, at, high)
             after = at - slope / (np.maximum(np.abs(curvature), TINY) * self.lengths[member])
             outside = ((after <= low) & (low > 0.0)) | ((after >= high) & (high < 1.0))
@@ -372,7 +372,7 @@ class Closest:
 
     def lies_up_to(self, fields: Fields, pair: PairKey, begin: float, end: float) -> bool:
         """Whether a member lies on an obstacle from a place where it touches up to an end of it: it does not turn."""
-        slope = self._gaps(fields, self.pairs[pair], np.array([end]))[2]
+        slope, _ = self._slopes(fields, self.pairs[pair], np.array([end]))
         level = abs(float(slope[0])) * self.scene.size < self.lying
         return level and self.lies(fields, pair, min(begin, end), max(begin, end))
 
@@ -382,29 +382,38 @@ class Closest:
 
     def bends(self, fields: Fields, pair: PairKey, at: float) -> float:
         """Curvature, 1/m, of the gap between a place of a member and an obstacle by arc length."""
-        return float(self._gaps(fields, self.pairs[pair], np.array([at]))[3][0])
+        return float(self._slopes(fields, self.pairs[pair], np.array([at]))[1][0])
 
-    def _gaps(self, fields: Fields, pair: Pair, x: Array) -> tuple[Array, Array, Array, Array]:
-        """Of places (n,) of the member gaps (n,), m, normals (n, 3), and slopes (n,) and curvatures (n,), 1/m, of the
-        gap by arc length; at an edge, which members may be at, gaps and normals for the side 1, and slopes, m, and
-        curvatures of half the square of the distance.
+    def _gaps(self, fields: Fields, pair: Pair, x: Array) -> tuple[Array, Array]:
+        """Of places (n,) of the member gaps (n,), m, and normals (n, 3); at an edge for the side 1."""
+        (member,), stop = pair.members, pair.stop
+        assert stop is not None
+        places = fields.positions(member, x)
+        # Only across an edge the normal depends on the member.
+        tangent = fields.slopes(member, x) if stop.kind == "sharp" else places
+        places, tangent = fields.seen(pair.contact, places, tangent)
+        normals = stop.normals(places, tangent)
+        return np.einsum("ni,ni->n", (places - stop.place) @ stop.across, normals) - pair.distance, normals
+
+    def _slopes(self, fields: Fields, pair: Pair, x: Array) -> tuple[Array, Array]:
+        """Of places (n,) of the member slopes (n,) and curvatures (n,), 1/m, of the gap by arc length.
+
+        At an edge, which members may be at, slopes, m, and curvatures of half the square of the distance.
         """
         (member,), stop = pair.members, pair.stop
         assert stop is not None
         places, tangent = fields.seen(pair.contact, fields.positions(member, x), fields.slopes(member, x))
         _, bent = fields.seen(pair.contact, places, self._curvature(fields, member, x))
         out = (places - stop.place) @ stop.across
-        normals = stop.normals(out + stop.place, tangent)
-        gaps = np.einsum("ni,ni->n", out, normals) - pair.distance
-        towards = out if pair.edge else normals
+        towards = out if pair.edge else stop.normals(places, tangent)
         slope, curvature = np.einsum("ni,ni->n", towards, tangent), np.einsum("ni,ni->n", towards, bent)
+        along = np.einsum("ni,ni->n", tangent @ stop.across, tangent)
         if pair.edge:
-            return gaps, normals, slope, curvature + np.einsum("ni,ni->n", tangent @ stop.across, tangent)
+            return slope, curvature + along
         if stop.kind == "round":
-            along = np.einsum("ni,ni->n", tangent @ stop.across, tangent)
             apart = np.maximum(np.linalg.norm(out, axis=1), TINY)
             curvature += stop.sign * (along - slope**2) / apart
-        return gaps, normals, slope, curvature
+        return slope, curvature
 
     # -- pieces -----------------------------------------------------------------------------------
 
@@ -515,7 +524,7 @@ class Closest:
         that come later on it.
         """
         if pair.stop is not None:
-            gaps, normals, *_ = self._gaps(fields, pair, stations)
+            gaps, normals = self._gaps(fields, pair, stations)
             held = np.array([x in (0.0, 1.0) and not pair.ends[int(x)] for x in stations.tolist()])
             return [
                 Near(pair.contact, pair.members, (float(stations[i]),), normals[i], float(gaps[i]), pair.distance)
@@ -565,7 +574,7 @@ class Closest:
         """Slopes (2,) or (1,) of the distance by the arc lengths at a place."""
         pair = self.pairs[key]
         if pair.stop is not None:
-            return self._gaps(fields, pair, np.array(at))[2]
+            return self._slopes(fields, pair, np.array(at))[0]
         return self._distance(fields, pair, np.array(at)[:, None])[0][:, 0]
 
     def _distance(self, fields: Fields, pair: Pair, at: Array) -> tuple[Array, Array, Array, Array]:
@@ -603,7 +612,8 @@ class Closest:
     def _curvature(self, fields: Fields, member: str, x: Array) -> Array:
         """Vectors of curvature (n, 3) of a centre line, 1/m."""
         low, high = np.maximum(x - BEND, 0.0), np.minimum(x + BEND, 1.0)
-        change = fields.tangents(member, high) - fields.tangents(member, low)
+        first, last = np.split(fields.tangents(member, np.concatenate([low, high])), 2)
+        change = last - first
         return np.asarray(change / ((high - low) * self.lengths[member])[:, None])
 
 
