@@ -77,16 +77,21 @@ class Screw(Curve):
 
     def positions(self, x: Floats) -> Floats:
         tangent = rotate(self.first, FORWARD)
+        if not self.turns:
+            # Straight, as most are: this is asked for again and again.
+            return np.outer(x, tangent)
         along = (self.axis @ tangent) * self.axis
         total = 2.0 * math.pi * self.turns
         rest = _turned(self.turns, x)[1]
-        forward = np.sin(2.0 * math.pi * rest) / total if total else x
-        aside = 2.0 * np.sin(math.pi * rest) ** 2 / total if total else 0.0 * x
+        forward = np.sin(2.0 * math.pi * rest) / total
+        aside = 2.0 * np.sin(math.pi * rest) ** 2 / total
         return numbers(
             np.outer(x, along) + np.outer(forward, tangent - along) + np.outer(aside, np.cross(self.axis, tangent))
         )
 
     def quaternions(self, x: Floats) -> Floats:
+        if not self.turns:
+            return np.tile(self.first, (len(x), 1))
         whole, rest = _turned(self.turns, x)
         sign = 1.0 - 2.0 * np.mod(whole, 2.0)
         real, imaginary = sign * np.cos(math.pi * rest), sign * np.sin(math.pi * rest)

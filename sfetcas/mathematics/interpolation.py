@@ -62,9 +62,15 @@ def pieces(breaks: Sequence[float], n: int) -> tuple[Array, Array]:
 
 
 def _barycentric(nodes: Array) -> Array:
+    return _weights(nodes.tobytes())
+
+
+@functools.lru_cache(maxsize=256)
+def _weights(values: bytes) -> Array:
+    nodes = np.frombuffer(values)
     difference = nodes[:, None] - nodes[None, :]
     np.fill_diagonal(difference, 1.0)
-    return np.asarray(1.0 / np.prod(difference, axis=1))
+    return fixed(np.asarray(1.0 / np.prod(difference, axis=1)))
 
 
 def evaluation(nodes: Array, x: ArrayLike) -> Array:
