@@ -4,6 +4,7 @@ Each function gives the text of a page; :func:`setup` writes them before Sphinx 
 """
 
 import argparse
+import functools
 import importlib
 import json
 import pkgutil
@@ -12,7 +13,11 @@ from dataclasses import dataclass
 from os import environ
 from pathlib import Path
 
-from numpydoc.docscrape import NumpyDocString
+import numpydoc.numpydoc
+from jinja2 import FileSystemLoader, Template
+from jinja2.sandbox import SandboxedEnvironment
+from numpydoc.docscrape import NumpyDocString, get_doc_object
+from numpydoc.docscrape_sphinx import SphinxClassDoc, SphinxFunctionDoc, SphinxObjDoc
 from pages import write_pages
 from sphinx.application import Sphinx
 
@@ -249,6 +254,21 @@ def _set_formulas(app: Sphinx, what: str, name: str, value: object, options: obj
             lines[i:i] = ["::", ""]
 
 
+@functools.cache
+def _template() -> Template:
+    """The template of a docstring."""
+    folder = Path(numpydoc.__path__[0]) / "templates"
+    return SandboxedEnvironment(loader=FileSystemLoader(folder)).get_template("numpydoc_docstring.rst")
+
+
+def _read_docstring(
+    obj: object, what: str | None = None, doc: str | None = None, config: typing.Any = None, builder: object = None
+) -> typing.Any:
+    """A docstring as numpydoc reads it, which compiles the template anew for each of some thousands."""
+    kinds = {"class_doc": SphinxClassDoc, "func_doc": SphinxFunctionDoc, "obj_doc": SphinxObjDoc}
+    return get_doc_object(obj, what=what, doc=doc, config={**(config or {}), "template": _template()}, **kinds)
+
+
 def _generate(app: Sphinx) -> None:
     reference = Path(app.srcdir) / "reference"
     made = {"scene": scene_tables(), "answers": answers_table()}
@@ -263,6 +283,7 @@ def _generate(app: Sphinx) -> None:
 def setup(app: Sphinx) -> dict[str, bool]:
     """Write the pages before Sphinx looks which there are."""
     app.connect("builder-inited", _generate)
+    numpydoc.numpydoc.get_doc_object = _read_docstring
     app.connect("autodoc-skip-member", _is_alias)
     # Before sections are made of them.
     app.connect("autodoc-process-docstring", _set_formulas, priority=100)
