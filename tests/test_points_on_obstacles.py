@@ -213,3 +213,33 @@ def test_a_bar_that_its_spring_lets_turn_twice_stops_at_a_peg():
     assert np.linalg.norm(step.contacts["peg"]["force"]) == pytest.approx(
         (moment - stiffness * angle) / lever, rel=1e-9
     )
+
+
+def test_straight_strip_whose_ends_come_nearer_by_a_history_bends_towards_a_plate():
+    """What has no place without loads begins at a small share of them, whether they grow evenly or by a history."""
+    nodes = {
+        "A": {"position": [0, 0], "support": "hinge"},
+        "C": {"position": [0.5, 0], "start": [0.45, 0.19]},
+        "B": {"position": [1, 0], "support": "hinge"},
+        "plate": {"position": [0.45, 0.1], "support": "clamped"},
+    }
+    members = {name: {"nodes": ends, "section": "s"} for name, ends in (("l", ["A", "C"]), ("r", ["C", "B"]))}
+    plate = {"type": "plane", "point": [0.45, 0.1], "normal": [0, -1], "members": "all", "node": "plate"}
+    moves = {"B": [-0.02, 0], "plate": [0, -0.02]}
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": nodes,
+        "members": members,
+        "contacts": {"c": plate},
+        "analysis": {"accuracy": 1e-4},
+    }
+    answers = []
+    for more in ({}, {"history": "even"}):
+        motions = {name: {"node": name, "displacement": way, **more} for name, way in moves.items()}
+        histories = {"histories": {"even": {"t": [0, 1], "value": [0, 1]}}} if more else {}
+        answers.append(solve(Scene.from_dict({**table, "motions": motions, **histories})).last)
+    evenly, by_history = answers
+    # The same equations on the same mesh.
+    np.testing.assert_allclose(by_history.position("C"), evenly.position("C"), atol=1e-9)
+    assert by_history.position("C") == pytest.approx([0.49, 0.08, 0.0], abs=1e-4)
+    np.testing.assert_allclose(force_of(by_history), force_of(evenly), rtol=1e-8)

@@ -133,7 +133,8 @@ class MemberContactSteps:
         begin, start = 0.0, self.run.lying(zero)
         if self.last is not None and self.last[0] * (factor - self.last[0]) >= 0.0:
             begin, start = self.last
-        elif self.scene.histories:
+        elif pilot.model.standing or any(pilot.model.factors(0.0).values()):
+            # What acts already without the factor.
             found = self.run.follow(lambda t: lambda model: model.loading(0.0, t), start)
             start = self._known(found)
         elif (pilot.lacks_slack or pilot.diagnosis.mobility) and start is zero:
