@@ -354,6 +354,22 @@ def test_rods_twisted_together_do_not_pass_each_other_between_places():
     assert wrong_contacts(step) == []
 
 
+def test_whole_turns_of_a_driven_end_are_not_lost():
+    """Two turns look like none in space: the torque of a straight rod tells how many, beside an arm that touches."""
+    nodes = {"a": clamped(0, 0, 0), "b": {"position": [1, 0, 0], "support": "slider", "direction": [1, 0, 0]}}
+    nodes |= {"c": clamped(0, 1, 0), "d": {"position": [1, 1, 0]}}
+    members = {"rod": {"nodes": ["a", "b"]}, "arm": {"nodes": ["c", "d"]}}
+    floor = {"type": "plane", "point": [0, 0, -0.1], "normal": [0, 0, 1], "member": "arm"}
+    loads = {"pull": {"type": "force", "node": "b", "value": [400, 0, 0]}}
+    loads |= {"press": {"type": "force", "node": "d", "value": [0, 0, -1]}}
+    motions = {"turn": {"node": "b", "rotation": [7.2 * np.pi, 0, 0]}}
+    more = {"contacts": {"floor": floor}, "loads": loads, "motions": motions, "dimension": "space"}
+    step = solve(scene_of(nodes, members, **more)).last
+    assert step.contacts["floor"]["at"] is not None
+    # Of a linear law what is left is rounding of Newton's method.
+    assert step.reaction("b")[1][0] == pytest.approx(0.8 * 7.2 * np.pi, rel=1e-8)
+
+
 def test_places_along_a_line_that_are_in_by_rounding_are_not_changed(monkeypatch):
     """Along a line all gaps are nearly zero: one by one such places would come and go without end."""
     solves = []

@@ -694,9 +694,11 @@ class MemberContact:
         self.jumps, self.falls, mesh = [], 0, replace(start.model.mesh, points=())
         self.patient = False
         now, step, left, pace = _Step(0.0, start), self.first, -1.0, 0.0
+        # In space what is driven by a whole turn looks as if it were not.
+        turn = way(1.0)(start.model).plus(way(0.0)(start.model).scaled(-1.0)).turned if start.model.space else 0.0
         while now.part < 1.0:
             self.reached = now
-            part, lines = min(1.0, now.part + step), self.lines.keys
+            part, lines = min(1.0, now.part + min(step, 1.0 / max(turn, 1.0))), self.lines.keys
             self.patient = step > PATIENT
             there = self._next(mesh, now.solved, way(part))
             self.patient = False

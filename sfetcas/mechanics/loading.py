@@ -120,6 +120,11 @@ class Loading:
         return self.of(lambda kind: bool(kind.drives))
 
     @property
+    def turned(self) -> float:
+        """Largest prescribed rotation, rad, or angle or displacement of a driven joint."""
+        return max(float(np.linalg.norm(self.turn, axis=1).max(initial=0.0)), self.driven)
+
+    @property
     def follows(self) -> bool:
         """Whether it has follower forces or moments."""
         return bool(self.of(lambda kind: kind.follows))

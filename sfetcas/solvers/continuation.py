@@ -175,7 +175,7 @@ def follow(
     """
     # What is driven may meet on its way what snaps, and in space a whole turn looks like none.
     whole = way(1.0).plus(way(0.0).scaled(-1.0))
-    turn = max(float(np.linalg.norm(whole.turn, axis=1).max(initial=0.0)), whole.driven)
+    turn = whole.turned
     driven = min(max(turn, float(np.abs(whole.shift).max(initial=0.0)) / TRAVEL, 1.0), FARTHEST)
     longest = 1.0 / max(turn if prepared.model.space else 0.0, driven)
     tries = MOST + int(AROUND * driven) if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL
