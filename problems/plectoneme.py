@@ -1,10 +1,10 @@
 """A rod under tension that is twisted until it snaps aside, touches itself and winds up: a plectoneme.
 
 One end is clamped, the other one is pulled and turned.  A straight rod takes the torque 2 sqrt(B T) at most
-(Greenhill); beyond, it snaps to a loop whose legs lie on each other, without friction, and the turns that follow go into
-the helices of both.  Nothing pulls or turns the loop at their end, so each cross-section of both legs together has neither force
-nor torque about their axis.  With the angle ``b`` of the helices, the radius ``r`` and the bending stiffness ``B`` the
-torque within the rod is
+(Greenhill); beyond, it snaps to a loop whose legs lie on each other, without friction, and the turns that follow go
+into the helices of both.  Nothing pulls or turns the loop at their end, so each cross-section of both legs together has
+neither force nor torque about their axis.  With the angle ``b`` of the helices, the radius ``r`` and the bending
+stiffness ``B`` the torque within the rod is
 
     Q = (2 B sin(b)^3 cos(b) / r - B r b'') / cos(2 b)
 
