@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from entries import GALLERY, Entry, made, problems, program_digest
 from pages import write_pages
@@ -151,7 +152,27 @@ def _generate(app: Sphinx) -> None:
             page.unlink()
 
 
+_TREES: dict[tuple[Any, ...], str] = {}
+"""Tables of contents beside pages that stand in none, by folder and what the theme asks for."""
+
+
+def _share_tree(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
+    """Beside pages that stand in no table of contents it is the same in each folder, and made once."""
+    make = context["toctree"]
+
+    def tree(**asked: Any) -> str:
+        key = (page.rpartition("/")[0], *sorted(asked.items()))
+        if key not in _TREES:
+            _TREES[key] = make(**asked)
+        return _TREES[key]
+
+    if "orphan" in (context.get("meta") or {}):
+        context["toctree"] = tree
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Make the pages before Sphinx looks which there are."""
     app.connect("builder-inited", _generate)
+    # Before the theme does.
+    app.connect("html-page-context", _share_tree, priority=400)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
