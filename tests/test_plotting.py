@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
 from matplotlib.text import Text
 
-from sfetcas import SceneError, Settings, load, solve
+from sfetcas import Scene, SceneError, Settings, load, solve
 from sfetcas.pictures.files import ENDINGS
 from sfetcas.pictures.plotting import picture, save_picture
 
@@ -573,3 +573,25 @@ def test_a_spring_without_visible_length_hangs_on_the_ground():
     line, *ground = drawn(figure, "spring-stay")
     assert np.linalg.norm(line[-1] - line[0]) > 0.05
     assert len(ground) == 2
+
+
+def test_a_node_without_members_that_carries_an_obstacle_is_drawn():
+    """With what acts on it: a force and a moment of its support, a load, a motion."""
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "B": {"position": [1, 0]},
+            "plate": {"position": [0.5, 0.2], "support": "clamped"},
+        },
+        "members": {"beam": {"nodes": ["A", "B"], "section": "s"}},
+        "contacts": {"c": {"type": "plane", "point": [0, 0.2], "normal": [0, -1], "members": "all", "node": "plate"}},
+        "motions": {"turn": {"node": "plate", "rotation": 0.1}},
+        "loads": {
+            "lift": {"type": "force", "node": "B", "value": [0, 2]},
+            "press": {"type": "force", "node": "plate", "value": [0, 1]},
+        },
+    }
+    figure = solve(Scene.from_dict(table)).plot()
+    drawn = {artist.get_gid() for artist in figure.findobj() if artist.get_gid()}
+    assert {"reaction-plate", "load-press"} <= {name.removesuffix("-label") for name in drawn}

@@ -244,7 +244,7 @@ def _sketch_spiral(sketch: Sketch, name: str, spring: Spring) -> None:
     """A spiral about the axis of a rotational spring, as its first party carries it."""
     carrier = (spring.between or ("ground",))[0]
     axis = quaternion.rotate(turned_party(sketch, carrier, spring.node), np.array(unit(sketch.scene.spring_axis(name))))
-    one, two = across(axis, sketch.leaving(spring.node)[0])
+    one, two = across(axis, sketch.direction(spring.node))
     angle = np.linspace(0.5 * math.pi, 5.0 * math.pi, 121)[:, None]
     radius = SPIRAL * sketch.size * angle / angle[-1]
     points = sketch.at(spring.node) + radius * (np.cos(angle) * one + np.sin(angle) * two)
@@ -375,7 +375,7 @@ def _sketch_motion(sketch: Sketch, name: str, motion: Motion) -> None:
         about = np.array(unit(turned_about(motion, node, sketch.scene.members)))
         vector = factor * (turn * about if isinstance(turn, float) else np.array(turn))
         ink = Ink(f"motion-{name}", MOTION, 1.2, dotted=True)
-        _sketch_turn(sketch, sketch.at(motion.node), sketch.leaving(motion.node)[0], vector, "rad", ink)
+        _sketch_turn(sketch, sketch.at(motion.node), sketch.direction(motion.node), vector, "rad", ink)
 
 
 def _sketch_load(sketch: Sketch, name: str, load: Load) -> None:
@@ -386,7 +386,7 @@ def _sketch_load(sketch: Sketch, name: str, load: Load) -> None:
         return _sketch_distributed(sketch, name, load, value)
     ink = Ink(f"load-{name}", LOAD, 1.8)
     if load.node is not None:
-        point, along, turned = sketch.at(load.node), sketch.leaving(load.node)[0], sketch.step.quaternion(load.node)
+        point, along, turned = sketch.at(load.node), sketch.direction(load.node), sketch.step.quaternion(load.node)
     else:
         assert load.member is not None
         x = np.array([load.at])
@@ -411,7 +411,7 @@ def _sketch_reaction(sketch: Sketch, name: str, node: Node) -> None:
     if norm(force) > max(tolerances.NEGLIGIBLE * max(largest, max(moments) / arm), rounding):
         _sketch_force(sketch, point, force, ink, pushing=True)
     if norm(moment) > max(tolerances.NEGLIGIBLE * max(moments), rounding * arm):
-        _sketch_turn(sketch, point, sketch.leaving(name)[0], moment, "N m", ink)
+        _sketch_turn(sketch, point, sketch.direction(name), moment, "N m", ink)
 
 
 def _sketch_pushes(sketch: Sketch, name: str, contact: Contact) -> None:

@@ -368,6 +368,11 @@ class Sketch:
                 found.append(first if member.nodes[0] == node else -last)
         return np.array(found).reshape(-1, 3)
 
+    def direction(self, node: str) -> Array:
+        """Unit tangent (3,) of the first member at a node, out of it; along x where there is none, but an obstacle."""
+        leaving = self.leaving(node)
+        return np.asarray(leaving[0]) if len(leaving) else np.array([1.0, 0.0, 0.0])
+
 
 def norm(vector: Any) -> float:
     """Length of a vector of any size."""
