@@ -150,6 +150,14 @@ class Edges:
         ways = np.array([way if pair.members == point.members else -way for pair, *_ in self._beside(point)])
         return bool((ways * (normals @ force)).max() < -ROUNDING)
 
+    def outwards(self, fields: Fields, point: ContactPoint, pair: Pair, end: int) -> float:
+        """Share of the push on a point at an end of a member that is not into that: where it is below zero it slides."""
+        return -float(_direction(fields.contact_point(point)["force"]) @ self._inwards(fields, pair, end))
+
+    def slides_off(self, pair: Pair, end: int) -> bool:
+        """Whether a member on an edge slides off it with an end: nothing else that the edge may push is there."""
+        return bool(pair.edge) and not (pair.ends[end] and self._at_node(pair, end))
+
     def joined(self, points: tuple[ContactPoint, ...]) -> tuple[ContactPoint, ...]:
         """Points of which two that have slid to one node, on members that end there, are one corner."""
         kept: list[ContactPoint] = []

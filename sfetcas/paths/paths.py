@@ -107,8 +107,6 @@ def follow_path(scene: Scene, settings: Settings | None = None, **changes: Any) 
 
 def _touching(scene: Scene, settings: Settings) -> Path | None:
     """The path of a scene whose members touch obstacles at places only; None where they lie along them."""
-    if any(stop.kind == "sharp" for stop in scene.obstacles.values()):
-        return None
     tracing = PathTracing(scene, settings, whole=True)
     try:
         return tracing.path()

@@ -95,11 +95,13 @@ class _Touch(_At):
     active : bool
         Whether it touches.
     normal : vector
+    edge : float
         As of :class:`~sfetcas.contact.closest.Near`.
     """
 
     active: bool
     normal: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    edge: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -300,7 +302,8 @@ class Touching(Conditions[_At]):
         if near.contact != point.contact:
             return False
         if near.pair == point.pair:
-            return self.closest.alike(near.pair, near.at, point.at, ONE)
+            # What is new on an edge stays while the member slides on it.
+            return (bool(point.edge) and point.new) or self.closest.alike(near.pair, near.at, point.at, ONE)
         return self._meet(near, point)
 
     def _meet(self, one: Near | ContactPoint, other: Near | ContactPoint) -> bool:
@@ -365,7 +368,10 @@ class Touching(Conditions[_At]):
         pair = self.closest.pairs.get((point.contact, members))
         if pair is None:
             return None
-        return replace(point, members=members, at=at, slides=slides, distance=pair.distance)
+        # Where the other one runs back an edge is on its other side.
+        back = member != point.members[side] and end == round(point.at[side])
+        edge = -point.edge if back else point.edge
+        return replace(point, members=members, at=at, slides=slides, distance=pair.distance, edge=edge)
 
     def _from_end(self, fields: Fields, point: ContactPoint, side: int, end: int) -> float:
         """How far a point is from an end of a member, below zero beyond it."""
@@ -373,16 +379,18 @@ class Touching(Conditions[_At]):
         return share * self.closest.lengths[point.members[side]] / fields.model.scales.length
 
     def _inward(self, fields: Fields, point: ContactPoint, one: _End) -> float:
-        """Slope of the gap from an end of a member to its inside."""
+        """Slope of the gap from an end of a member to its inside; of an edge how much its push is not into that."""
         there = self._on(point, one.side, one.member, one.end)
         assert there is not None
+        if point.edge:
+            return self.run.edges.outwards(fields, point, self.closest.pairs[there.pair], one.end)
         slope = self.closest.slopes(fields, there.pair, there.at)[_side(there.members, one)]
         return float(-slope if one.end else slope)
 
     def _held(self, fields: Fields) -> Iterator[tuple[_Driven, float]]:
         """Ends of members that no obstacle can push, and their gaps, m."""
         for pair in self.closest.pairs.values():
-            if pair.stop is None:
+            if pair.stop is None or pair.edge:
                 continue
             (member,), radius = pair.members, self.scene.contacts[pair.contact].member_radius
             for end, free in enumerate(pair.ends):
@@ -393,6 +401,8 @@ class Touching(Conditions[_At]):
 
     def _bend(self, fields: Fields, one: _At | ContactPoint) -> float:
         """Least curvature of the gap along what a place slides on, or begins to slide on, dimensionless."""
+        if self.closest.pairs[one.pair].edge:
+            return OPEN
         at = np.clip(one.at, 0.0, 1.0)
         slopes = self.closest.slopes(fields, one.pair, tuple(at.tolist()))
         free = np.flatnonzero(((at > 0.0) & (at < 1.0)) | (np.abs(slopes) <= NEAR))
@@ -443,6 +453,9 @@ class Touching(Conditions[_At]):
         for one in near:
             if isinstance(one, _Driven):
                 return f"node {self._node(one.members[0], one.at[0])} is led into contacts.{one.contact}"
+        for one in near:
+            if isinstance(one, _End) and self.run.edges.slides_off(self.closest.pairs[one.pair], one.end):
+                return f"{one.member} slides off contacts.{one.contact} with its end"
         flat = [one for one in near if isinstance(one, _Flat)]
         flat += [_Flat(*one.pair, one.at) for one in near if isinstance(one, _Touch) and self._lies(fields, one)]
         return _lying(flat) if flat else ""
@@ -469,7 +482,8 @@ class Touching(Conditions[_At]):
         for one in touches:
             if not one.active:
                 distance, still = self.closest.pairs[one.pair].distance, (False,) * len(one.at)
-                kept.append(ContactPoint(*one.pair, one.at, still, distance, normal=one.normal, new=True))
+                new = ContactPoint(*one.pair, one.at, still, distance, normal=one.normal, new=True, edge=one.edge)
+                kept.append(new)
         return Choice(points=tuple(self.run.lines.set_out(fields.model.mesh, kept)))
 
     def _at_ends(self, point: ContactPoint, ends: Sequence[_End]) -> ContactPoint | None:
@@ -528,6 +542,8 @@ class Touching(Conditions[_At]):
 
     def _freed(self, fields: Fields, point: ContactPoint) -> ContactPoint:
         """A point that has begun to touch as it slides."""
+        if point.edge:
+            return replace(point, slides=(True,), new=False)
         ends = [(i, x) for i, x in enumerate(point.at) if x in (0.0, 1.0)]
         at_end = {
             i: self._inward(fields, point, _End(*point.pair, point.at, i, point.members[i], int(x))) for i, x in ends
@@ -537,6 +553,7 @@ class Touching(Conditions[_At]):
 
     def passed(self, before: Standing, after: Standing) -> bool:
         """As of :class:`.Conditions`."""
+        self.run.edges.begin(before.fields)
         return self.run.passed(before.fields, after.fields)
 
 
@@ -555,7 +572,7 @@ def _side(members: tuple[str, ...], one: _End) -> int:
 
 def _touch(near: Near) -> _Touch:
     x, y, z = near.normal.tolist()
-    return _Touch(*near.pair, near.at, False, (x, y, z))
+    return _Touch(*near.pair, near.at, False, (x, y, z), near.edge)
 
 
 def _lying(places: Sequence[_At | ContactPoint]) -> str:
