@@ -25,7 +25,7 @@ from ..mechanics.segments import SAME_CUT, standing
 from ..solvers.prepared import Solved
 from .closest import Closest, Near, Pair, PairKey
 
-__all__ = ["LINE", "SHORT_LINE", "Lines", "Points", "begun", "points_in", "points_of"]
+__all__ = ["LINE", "SHORT_LINE", "Lines", "Points", "begun", "lies_along", "points_in", "points_of"]
 
 Points = tuple[ContactPoint, ...]
 
@@ -576,6 +576,12 @@ def points_in(fields: Fields) -> Points:
 def slides(one: ContactPoint | Near) -> bool:
     """Whether a place on the first member is an unknown."""
     return isinstance(one, ContactPoint) and one.slides[0]
+
+
+def lies_along(points: Iterable[ContactPoint]) -> bool:
+    """Whether some points stand for a line on an obstacle."""
+    alone = (point for point in points if len(point.members) == 1 and not point.new)
+    return any(point.line or (not point.slides[0] and 0.0 < point.at[0] < 1.0) for point in alone)
 
 
 def beside_ends(one: ContactPoint | Near) -> bool:

@@ -28,6 +28,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import ContactPoint, Mesh
 from ..mechanics.model import Model
 from ..mechanics.segments import cuts_of_point, place_of_cut
+from ..solvers.arclength import Curve, Tangent, bordered
 from ..solvers.between_states import turned_between
 from ..solvers.continuation import JUMPED, near_factor
 from ..solvers.newton import Limits, correct
@@ -53,8 +54,10 @@ SOFTENED, LEAST_SOFTENED = 0.125, 1e-3
 SLIPPED = 1e-6
 """Share of the limit of friction from which on a place slides on, and by which length, dimensionless."""
 
-TURN, ITERATIONS = 0.6, 30
-"""Largest rotation of a node in a step of Newton's method but the first, rad, and steps at most."""
+TURN, ITERATIONS, ACROSS = 0.6, 30, 12
+"""Largest rotation of a node in a step of Newton's method but the first, rad, and steps at most, also across a
+direction, where shorter steps along a path are another way.
+"""
 
 STRIDE = 0.5
 """Largest rotation in a step of the way, rad: members between are then near to where they are at its ends."""
@@ -154,6 +157,9 @@ class MemberContact:
     lines : Lines
         The lines along which members touch.
     edges : Edges
+    across : callable or None
+        Model -> its curve and a direction on it: where it is given the factor of the loads is an unknown, from that of
+        the near state on, and the equilibrium one across the direction, see :meth:`.Curve.corrected`.
     """
 
     def __init__(
@@ -171,6 +177,7 @@ class MemberContact:
         self.lines = Lines(scene, self.closest, fixed)
         self.falls, self.patient = 0, False
         self.edges = Edges(scene, self.closest, self.tolerance)
+        self.across: Callable[[Prepared], tuple[Curve, Tangent]] | None = None
 
     # -- begin ------------------------------------------------------------------------------------
 
@@ -301,9 +308,11 @@ class MemberContact:
         acting = np.array([i < len(points) or self.lines.element_of(mesh, every[i]) in halves - {None} for i in free])
         resisting = None if since is None else self._drag(prepared, since, drag)
         loads, state = way(prepared.model), self.carried(source, prepared)
-        system = OneSided(prepared.equations, loads, prepared.weight, None, None, resisting, pushing, acting)
+        border = None if self.across is None else bordered(*self.across(prepared))
+        system = OneSided(prepared.equations, loads, prepared.weight, None, None, resisting, pushing, acting, border)
+        limits = Limits(iterations=ITERATIONS if border is None else ACROSS, most=TURN, contraction=2.0)
         with np.errstate(over="ignore", invalid="ignore"):
-            found = correct(system, state, limits=Limits(iterations=ITERATIONS, most=TURN, contraction=2.0))
+            found = correct(system, state, factor=source.factor, limits=limits)
         if not found.converged:
             return None
         # What pushes by rounding may as well not: on another processor it does not.
@@ -349,6 +358,9 @@ class MemberContact:
             resisting = self._drag(prepared, since, drag)
         # What is lost may overflow before it is told to be.
         with np.errstate(over="ignore", invalid="ignore"):
+            if self.across is not None:
+                curve, along = self.across(prepared)
+                return curve.corrected(state, source.factor, along)
             found = prepared.correct(state, loading, iterations=ITERATIONS, most=TURN, contraction=2.0, drag=resisting)
         good = found.converged or found.residual <= tolerances.BALANCED
         return found if good else None

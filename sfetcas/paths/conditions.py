@@ -24,6 +24,7 @@ from ..mechanics.unilateral import Stops, Unilateral, switched_over, unilaterals
 from ..solvers.arclength import Curve, Standing
 from ..solvers.beginning import begin_path
 from ..solvers.prepared import Prepared
+from .lying import Lying, Piece
 
 __all__ = ["NEAR", "Begun", "Choice", "Conditions", "Stopping", "Way"]
 
@@ -157,6 +158,27 @@ class Conditions(ABC, Generic[One]):
     def refused(self, fields: Fields, near: Sequence[One]) -> str:
         """Why a path does not go on beyond a state, a sentence; empty where it may."""
         return ""
+
+    def flat(self, fields: Fields, near: Sequence[One] = ()) -> list[ContactPoint]:
+        """Places at a state at which members begin to lie along obstacles, also where some conditions change."""
+        return []
+
+    def flats(self, fields: Fields) -> tuple[int, ...]:
+        """Numbers of what is watched that say where what touches at places begins to lie along something."""
+        return ()
+
+    def lying(self, mesh: Mesh, span: tuple[float, float], piece: Piece) -> Lying | None:
+        """What follows a path where members lie along obstacles, on a mesh; None where none can.
+
+        Parameters
+        ----------
+        mesh : Mesh
+        span : (low, high)
+            Range of factors.
+        piece : callable
+            As of :class:`~sfetcas.paths.lying.Lying`.
+        """
+        return None
 
     def made(self, prepared: Prepared) -> Prepared:
         """A model of one choice as the path needs it."""

@@ -39,7 +39,6 @@ from ..solvers.redundancy import with_sharing
 from ..solvers.residuals import relative_residual
 from ..solvers.tracing import full_shape, passes, switched
 from .conditions import Choice, Conditions, Stopping
-from .contact_path import MARGIN, STEADY, follow_in_contact
 from .memory_path import HILL, MISSING, chosen_of, left_along, refined_by_fronts, sampled_again, steps_of
 from .path import NO_POTENTIAL, Branch, Path, PathPoint, TransitionPoint, ending
 from .switching import Choices, First, Followed, Transition
@@ -50,6 +49,12 @@ __all__ = ["buckling_mode", "follow_path", "switch"]
 
 LEVELS = 10
 """Most halvings of the first mesh."""
+
+MARGIN = 16.0
+"""A halving gains this many times less than its order promises, as far as estimates go."""
+
+STEADY = 0.3
+"""Share of the factor in the tangent from which on a point may be compared at its factor."""
 
 HOPED = 4.0
 """Times more than that is hoped for when meshes are skipped."""
@@ -99,19 +104,8 @@ def follow_path(scene: Scene, settings: Settings | None = None, **changes: Any) 
     if scene.analysis.type != "path":
         raise SceneError(f"found {scene.analysis.type!r}, accepted: 'path' to follow one", ("analysis", "type"))
     settings = settings_with(settings, changes)
-    if scene.contacts and not scene.touches_at_points:
-        return _touching(scene, settings) or follow_in_contact(scene, settings)
     path = PathTracing(scene, settings).path()
     return with_modes(path, settings) if scene.analysis.count_of_modes else path
-
-
-def _touching(scene: Scene, settings: Settings) -> Path | None:
-    """The path of a scene whose members touch obstacles at places only; None where they lie along them."""
-    tracing = PathTracing(scene, settings, whole=True)
-    try:
-        return tracing.path()
-    except SolveError:
-        return None
 
 
 @single_threaded
@@ -216,7 +210,7 @@ class _Stretch:
     def leads_through(self, curve: Curve, point: Standing) -> bool:
         """Whether it leads through an equilibrium on a curve."""
         kind = Choice.of(curve.model.mesh).kind
-        parts = [p for p in self.traced.parts if Choice.of(p.curve.model.mesh).kind == kind]
+        parts = [p for p in self.traced.parts if Choice.of(p.curve.model.mesh).kind == kind and not p.lies]
         return any(passes(p.curve, p.traced, point) for p in parts)
 
     def of_kind(self, kind: str) -> list[Standing]:
@@ -252,13 +246,11 @@ class PathTracing:
     Parameters
     ----------
     scene, settings
-    whole : bool
-        Whether a path that cannot be followed over a change is none.
     """
 
-    def __init__(self, scene: Scene, settings: Settings, *, whole: bool = False) -> None:
+    def __init__(self, scene: Scene, settings: Settings) -> None:
         self.scene, self.settings, self.analysis = scene, settings, scene.analysis
-        self.span, self.whole = scene.analysis.span, whole
+        self.span = scene.analysis.span
         self.accuracy = settings.accuracy or scene.analysis.accuracy
         members = scene.members.items()
         self.fixed = {n for n, m in members if (settings.elements or m.elements) is not None}
@@ -380,8 +372,6 @@ class PathTracing:
         main = _Stretch(choices.follow(first, self.points, MISSING * self.accuracy))
         curve, start = first.curve, first.begins or first.standing
         way = max(abs(point.factor - start.factor) for point in main.traced.points)
-        if self.whole and main.traced.end in ("lost", "margin"):
-            raise SolveError(Status.FAILED, main.traced.message, start.state)
         if main.traced.end == "bent" and way < LEAST_WAY * self._widest:
             assert main.traced.limit is not None
             raise SolveError(main.traced.limit.status, main.traced.limit.detail, start.state)
@@ -389,7 +379,7 @@ class PathTracing:
             detail = f"the path cannot be followed beyond factor {main.traced.points[-1].factor:.3g}"
             raise SolveError(Status.FAILED, detail, start.state)
         self.first = Choice.of(curve.model.mesh)
-        for part in (part for part in main.traced.parts if len(part.traced.points) > 1):
+        for part in (part for part in main.traced.parts if len(part.traced.points) > 1 and not part.lies):
             check_slack(part.curve, part.traced)
         level = _Level(choices, curve, [main], notes)
         bends = [(part.curve, e) for part in main.traced.parts for e in part.traced.events if e.kind == "bifurcation"]

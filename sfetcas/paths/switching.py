@@ -14,23 +14,26 @@ from __future__ import annotations
 
 import functools
 import itertools
+import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
+from ..contact.lines import lies_along, points_of
 from ..description.records import enumerated
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.fields import Fields, transferred
-from ..mechanics.mesh import Mesh
+from ..mechanics.mesh import ContactPoint, Mesh
 from ..solvers.arclength import PASSING, Curve, Standing, Tangent
 from ..solvers.beginning import begin_path
 from ..solvers.critical import Event, at_factors, events_between, sought
 from ..solvers.prepared import Prepared
 from ..solvers.tracing import Traced, trace, without
 from .conditions import NEAR, Choice, Conditions, Way
+from .lying import Lying
 
 __all__ = ["Choices", "First", "Followed", "Part", "Transition"]
 
@@ -49,14 +52,22 @@ LOCKED = 1e-3
 ALIKE = 1e-6
 """Two ways on whose directions differ by less are one: a constraint that does nothing makes no other."""
 
-FITS = 3
-"""Times that elements are made to end where something acts: each leaves a thirtieth of how far that is off, or less."""
+FITS, FLAT_FITS = 3, 8
+"""Times that elements are made to end where something acts: each leaves a thirtieth of how far that is off, or less;
+where a gap ceases to be curved more of it, as the place then goes far under small changes.
+"""
 
-BESIDE = (1e-3, 1e-2, 5e-2)
+BENT = 0.5
+"""Share of the largest curvature of a gap along a path below which it is looked at more closely."""
+
+BESIDE = (1e-3, 1e-2, 5e-2, 0.2)
 """Arc lengths before and behind an event between which it is located on a mesh that is made for it."""
 
 S = TypeVar("S", Event, Standing)
 """What is located."""
+
+BACK = 6
+"""Points back from the first one without lines within which they end: steps along lines are no longer."""
 
 MOST = 6
 """Conditions without a margin at one point, at most: all choices of them may have to be looked at."""
@@ -73,11 +84,14 @@ class Part:
     traced : Traced
     begins : Standing or None
         Where it begins, if that is a little before the first point that was traced.
+    lies : bool
+        Whether members lie along obstacles: each point then has a model of its own.
     """
 
     curve: Curve
     traced: Traced
     begins: Standing | None = None
+    lies: bool = False
 
     @property
     def points(self) -> list[Standing]:
@@ -222,6 +236,8 @@ class Choices:
         self._prepare, self._known = prepare, dict[Choice, Prepared]()
         self.unit, self.conditions = max(map(abs, span)), conditions
         self._base, self._finer = mesh if base is None else base, finer
+        self.lying = conditions.lying(self.mesh, span, self._piece)
+        self._margins = weakref.WeakKeyDictionary[Standing, Array]()
 
     def prepared(self, choice: Choice = NOTHING) -> Prepared:
         """The model of a choice, ready to be solved."""
@@ -254,6 +270,12 @@ class Choices:
             return First(curve, start), notes
         curve, start, notes = self.conditions.begin(self.prepared, self.span, first)
         self.unit = curve.unit
+        if lies_along(start.model.mesh.points):
+            laid = self._lying.at_factor(start, start.factor)
+            if laid is None:
+                detail = f"what lies along obstacles at factor {start.factor:g} was not found on the mesh of the path"
+                raise SolveError(Status.FAILED, detail, start.state)
+            return First(curve, laid), notes
         near = self.conditions.near(start.fields)
         if not near:
             return First(curve, start), notes
@@ -285,17 +307,30 @@ class Choices:
         watch, passed = (self._watched, self.conditions.passed) if self.conditions.any else (None, None)
         while True:
             left = max(1, count - found.count) if found.parts else count
+            if lies_along(first.standing.model.mesh.points):
+                onward = self._along_lines(found, first.standing, left)
+                if onward is None:
+                    return found
+                first = onward
+                continue
             curve = first.curve
-            traced = trace(curve, first.standing, self.span, left, self.knots, watch, missing, passed)
+            traced = self._until_flat(trace(curve, first.standing, self.span, left, self.knots, watch, missing, passed))
             found.parts.append(Part(curve, traced, first.begins))
             if traced.end != "margin":
                 return found
             at, kind = traced.points[-1], Choice.of(curve.model.mesh).kind
             tried = {kind} if len(traced.points) > 1 else {*tried, kind}
             near = self.conditions.near(at.fields, traced.crossed)
-            found.ending = self._refused(at, near)
+            flat = self.conditions.flat((self.again(at) or at).fields, near)
+            found.ending = self._refused(at, [] if flat else near)
             if found.ending:
                 return found
+            if flat:
+                onward = self._lies_down(found, curve, at, traced.crossed, flat, left)
+                if onward is None:
+                    return found
+                first = onward
+                continue
             ways = self._ways(at, near, float(np.sign(at.tangent.factor)))
             if len(ways) != 1 or ways[0].choice.kind in tried:
                 found.ending = self._several(ways, near)
@@ -306,16 +341,104 @@ class Choices:
             found.transitions.append(Transition(at, changes, turns, _said(at, way.standing, turns), traced.crossed))
             first = self._onward(way)
 
+    @property
+    def _lying(self) -> Lying:
+        """What follows a path where members lie along obstacles."""
+        self.lying.unit = self.unit
+        return self.lying
+
+    def _lies_down(
+        self,
+        found: Followed,
+        curve: Curve,
+        at: Standing,
+        crossed: tuple[int, ...],
+        flat: Sequence[ContactPoint],
+        count: int,
+    ) -> First | None:
+        """Add what follows a point at which members begin to lie along obstacles at some places; what begins then.
+
+        None where the path ends.
+        """
+        if any(any(point.slides) for point in flat):
+            # Where elements do not end at a place the curvature is not known there.
+            crossed = self.conditions.flats(at.fields)
+            here = self._sought(curve, at, functools.partial(self._crossed, crossed), FLAT_FITS)
+            fitted = self.again(at)
+            if here is None and fitted is not None and not self.conditions.flat(fitted.fields):
+                return First(Curve(fitted.prepared, self.unit), fitted)
+            at = here or fitted or at
+            found.parts[-1].traced.points[-1] = at
+        told = tuple(dict.fromkeys(f"{p.members[0]} begins to lie along contacts.{p.contact}" for p in flat))
+        found.transitions.append(Transition(at, told, False, (), crossed))
+        return self._along_lines(found, replace(at), count)
+
+    def _along_lines(self, found: Followed, start: Standing, count: int) -> First | None:
+        """Add the part of a path along which members lie on obstacles, and the change at its end; what begins there.
+
+        None where the path ends.
+        """
+        lying = self._lying
+        traced = lying.traced(start, lambda at: self.conditions.flat(at.fields), count)
+        found.parts.append(Part(lying.curve(start), traced, lies=True))
+        names = sorted({f"contacts.{p.contact}" for point in traced.points for p in point.model.mesh.points})
+        if traced.end == "lost":
+            found.parts[-1] = replace(found.parts[-1], traced=replace(traced, end="margin"))
+            found.ending = f"what lies along {enumerated(names)} is in balance nowhere near beyond it"
+        if traced.end != "ceases":
+            return None
+        last, points = traced.points[-1], points_of(traced.points[-1])
+        choice = Choice(points=points)
+        curve, along = lying.along(last, self.prepared(choice))
+        free = curve.corrected(self.conditions.carried(last, curve.prepared), last.factor, along, last.arc)
+        if free is None:
+            found.parts[-1] = replace(found.parts[-1], traced=replace(traced, end="lost"))
+            return None
+        at, crossed = self._begin_of(curve, free)
+        found.parts[-1] = replace(found.parts[-1], traced=replace(traced, points=[*traced.points[:-1], at]))
+        told = (f"nothing lies along {enumerated(names)} any more",)
+        found.transitions.append(Transition(at, told, False, (), crossed))
+        return First(self.curve(choice), replace(at))
+
+    def _begin_of(self, curve: Curve, there: Standing) -> tuple[Standing, tuple[int, ...]]:
+        """Where the choice of a point begins to hold, and the margins that vanish there; the point if not found."""
+        back = replace(there, tangent=turned_back(there.tangent))
+        traced = trace(curve, back, self.span, BACK, self.knots, self._watched, np.inf, self.conditions.passed)
+        if traced.end != "margin":
+            return there, ()
+        at = traced.points[-1]
+        return replace(at, tangent=turned_back(at.tangent), arc=2.0 * there.arc - at.arc), traced.crossed
+
     def _watched(self, standing: Standing) -> Array:
         """Margins (conditions,) of a point."""
-        return self.conditions.watched(standing.fields)
+        if standing not in self._margins:
+            self._margins[standing] = self.conditions.watched(standing.fields)
+        return self._margins[standing]
+
+    def _until_flat(self, traced: Traced) -> Traced:
+        """A stretch up to the first point from which on members lie along something.
+
+        That is seen where elements end at places: elsewhere curvatures are those of both sides of a force mixed.
+        """
+        flats = list(self.conditions.flats(traced.points[0].fields))
+        if not flats:
+            return traced
+        margins = np.array([self._watched(point)[flats].min() for point in traced.points])
+        for i in (np.flatnonzero(margins[1:] < BENT * margins.max()) + 1).tolist():
+            fitted = self.again(traced.points[i])
+            if fitted is not None and self.conditions.flat(fitted.fields):
+                known = {id(point) for point in traced.points[:i]}
+                events = [event for event in traced.events if id(event.standing) in known]
+                return replace(traced, points=traced.points[: i + 1], events=events, end="margin", crossed=tuple(flats))
+        return traced
 
     def crossings(self, followed: Followed, factors: tuple[float, ...]) -> list[Standing]:
         """The points at given factors, in their order along the path; where parts meet they are listed once."""
         found = list[Standing]()
         for part in followed.parts:
             first, begins = part.points[0], part is followed.parts[0]
-            met = at_factors(part.curve, part.traced.points, factors)
+            along = part.traced.points
+            met = self._lying.crossings(along, factors) if part.lies else at_factors(part.curve, along, factors)
             if part.begins is not None:
                 met = [*self._from(part.begins, part.curve, part.traced.points[0], factors), *met]
             found += [point for point in met if begins or point is not first]
@@ -342,6 +465,8 @@ class Choices:
 
         At a ``factor`` or, by default, across its tangent.
         """
+        if lies_along(at.model.mesh.points):
+            return at if factor is None else self._lying.at_factor(at, factor)
         found: Standing | None = at
         for _ in range(FITS):
             mesh = self._fit(at.fields)
@@ -379,15 +504,20 @@ class Choices:
     def located(self, followed: Followed) -> Followed:
         """A path whose events and transitions are located where elements end where something acts then."""
         parts, transitions = list[Part](), list[Transition]()
-        for part, change in itertools.zip_longest(followed.parts, followed.transitions):
+        following = [*followed.parts[1:], None]
+        for part, after, change in itertools.zip_longest(followed.parts, following, followed.transitions):
             found, events = dict[int, Standing](), list[Event]()
             for event in part.traced.events:
-                there = self._sought(part.curve, event.standing, functools.partial(_event_of, event.kind)) or event
+                seek_event = functools.partial(_event_of, event.kind)
+                there = event if part.lies else self._sought(part.curve, event.standing, seek_event) or event
                 events.append(there)
                 found[id(event.standing)] = there.standing
             if change is not None:
                 seek = functools.partial(self._crossed, change.crossed)
-                last = self._sought(part.curve, change.standing, seek) or change.standing
+                # Where lines end it is the choice beyond that has margins.
+                on = after.curve if part.lies else part.curve
+                own = change.standing.prepared is on.prepared
+                last = (self._sought(on, change.standing, seek) if own else None) or change.standing
                 transitions.append(replace(change, standing=last))
                 found[id(change.standing)] = last
             points = [found.get(id(point), point) for point in part.traced.points]
@@ -411,10 +541,12 @@ class Choices:
             parts.append(replace(part, traced=traced, begins=begins))
         return replace(followed, parts=parts)
 
-    def _sought(self, curve: Curve, at: Standing, seek: Callable[[Curve, Standing, Standing], S | None]) -> S | None:
+    def _sought(
+        self, curve: Curve, at: Standing, seek: Callable[[Curve, Standing, Standing], S | None], times: int = FITS
+    ) -> S | None:
         """What is sought between two points beside one where elements end where something acts; None if not found."""
         found: S | None = None
-        for _ in range(FITS):
+        for _ in range(times):
             mesh = self._fit(at.fields)
             if mesh is self.mesh:
                 break
@@ -525,6 +657,11 @@ class Choices:
             return f"no choice of {self.conditions.choosing} leads on: {names}"
         told = ["; ".join(self.conditions.told(one, way.choice) for one in near) for way in ways]
         return f"{len(ways)} ways lead on, and the path branches: {' or '.join(told)}"
+
+
+def turned_back(tangent: Tangent) -> Tangent:
+    """The tangent the other way along the curve."""
+    return replace(tangent, z=-tangent.z, factor=-tangent.factor)
 
 
 def _event_of(kind: str, curve: Curve, a: Standing, b: Standing) -> Event | None:

@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..contact.closest import Near
-from ..contact.lines import LINE, points_in, points_of
+from ..contact.lines import LINE, lies_along, points_in, points_of
 from ..contact.member_contact import MemberContact
 from ..description.records import enumerated
 from ..description.scene import Scene
@@ -34,6 +34,7 @@ from ..solvers.beginning import begin_path, begun_at, beside_zero
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.redundancy import redundant
 from .conditions import NEAR, Begun, Choice, Conditions, Way
+from .lying import Lying, Piece
 
 __all__ = ["Touching"]
 
@@ -48,9 +49,9 @@ LEFT = 1e-8
 no direction in which the Lagrangian is clearly largest.
 """
 
-STRAIGHT = 1e-4
-"""Curvature of a gap, dimensionless, below which a member begins to lie along something: at a free end it is zero, but
-for errors of the mesh.
+STRAIGHT, AT_END = 1e-6, 1e-4
+"""Curvature of a gap, dimensionless, below which a member begins to lie along something: where it is zero the place is
+not known.  At a free end it is zero, but for errors of the mesh.
 """
 
 OPEN = 1.0
@@ -160,7 +161,7 @@ class Touching(Conditions[_At]):
         fixed: Collection[str],
         beside: Callable[[float], Equilibrium],
     ) -> None:
-        self.scene, self.beside = scene, beside
+        self.scene, self.accuracy, self.beside = scene, accuracy, beside
         self.run = MemberContact(scene, prepare, accuracy, fixed)
         self.closest = self.run.closest
         self.reach = REACH * scene.size
@@ -208,11 +209,11 @@ class Touching(Conditions[_At]):
         near, mesh = self.beside(factor), prepared(Choice()).model.mesh
         own = Prepared(near.model)
         source = Solved(own, near.state, near.loading, own.equations.at(near.state, near.loading), 0.0)
-        points, found = points_of(source), None
-        lines = [point for point in points if point.line]
-        if not lines:
-            found = self.run.resolved(mesh, points, source, lambda model: model.loading(factor))
-            lines = [point for point in points if self.run.lines.has(point)]
+        points = points_of(source)
+        if lies_along(points):
+            return begun_at(own, near.state, factor, notes, span)
+        found = self.run.resolved(mesh, points, source, lambda model: model.loading(factor))
+        lines = [point for point in points if self.run.lines.has(point)]
         if lines:
             raise SolveError(Status.FAILED, _lying(lines), near.state)
         if found is None:
@@ -234,7 +235,7 @@ class Touching(Conditions[_At]):
         close += [end for point in points for end, margin in self._beyond(fields, point) if abs(margin) <= NEAR]
         wanted = [found[i][0] for i in crossed] + close
         new = [one for one in wanted if isinstance(one, _End) or (isinstance(one, _Touch) and not one.active)]
-        wanted += [_Flat(*one.pair, one.at) for one in new if self._bend(fields, one) <= STRAIGHT]
+        wanted += [_Flat(*one.pair, one.at) for one in new if self._bend(fields, one) <= AT_END]
         return list(dict.fromkeys(wanted))
 
     def margin(self, fields: Fields, which: Sequence[_At]) -> Array:
@@ -456,7 +457,7 @@ class Touching(Conditions[_At]):
         for one in near:
             if isinstance(one, _End) and self.run.edges.slides_off(self.closest.pairs[one.pair], one.end):
                 return f"{one.member} slides off contacts.{one.contact} with its end"
-        flat = [one for one in near if isinstance(one, _Flat)]
+        flat = [one for one in near if isinstance(one, _Flat) and len(one.members) == 2]
         flat += [_Flat(*one.pair, one.at) for one in near if isinstance(one, _Touch) and self._lies(fields, one)]
         return _lying(flat) if flat else ""
 
@@ -465,6 +466,40 @@ class Touching(Conditions[_At]):
         beside = [point for point in points_in(fields) if point.pair == new.pair and len(point.members) == 2]
         near = any(self.closest.alike(new.pair, new.at, point.at) for point in beside)
         return not new.active and (near or len(beside) + 1 >= LINE)
+
+    def flat(self, fields: Fields, near: Sequence[_At] = ()) -> list[ContactPoint]:
+        """As of :class:`.Conditions`: the gap is not curved there."""
+        points = points_in(fields)
+        points += tuple(self._new(one) for one in near if isinstance(one, _Touch) and one.at and not one.active)
+        return [point for point in points if len(point.members) == 1 and self._is_flat(fields, point, points)]
+
+    def _is_flat(self, fields: Fields, point: ContactPoint, points: Sequence[ContactPoint]) -> bool:
+        """Whether a member begins to lie along an obstacle at a place, one of some points."""
+        if point.edge or not self.run.lines.bends(point.members[0]):
+            return False
+        beside = (other.at[0] for other in points if other.pair == point.pair and other is not point)
+        if any(self.closest.lies(fields, point.pair, *sorted((x, point.at[0]))) for x in beside):
+            return True
+        at = min(max(point.at[0], 0.0), 1.0)
+        if at in (0.0, 1.0):
+            (slope,) = self.closest.slopes(fields, point.pair, (at,)).tolist()
+            if (1.0 - 2.0 * at) * slope > NEAR:
+                return False
+        least = STRAIGHT if 0.0 < at < 1.0 else AT_END
+        return self.closest.bends(fields, point.pair, at) * fields.model.scales.length <= least + NEAR
+
+    def flats(self, fields: Fields) -> tuple[int, ...]:
+        """As of :class:`.Conditions`."""
+        return tuple(i for i, (one, _) in enumerate(self._margins(fields)) if isinstance(one, _Flat))
+
+    def lying(self, mesh: Mesh, span: tuple[float, float], piece: Piece) -> Lying:
+        """As of :class:`.Conditions`."""
+        return Lying(self.run, mesh, span, piece, self.accuracy)
+
+    def _new(self, one: _Touch) -> ContactPoint:
+        """A place that begins to touch."""
+        distance, still = self.closest.pairs[one.pair].distance, (False,) * len(one.at)
+        return ContactPoint(*one.pair, one.at, still, distance, normal=one.normal, new=True, edge=one.edge)
 
     def switched(self, fields: Fields, which: Sequence[_At]) -> Choice | None:
         """As of :class:`.Conditions`: the places begin where they are now."""
@@ -479,11 +514,7 @@ class Touching(Conditions[_At]):
             if moved is None:
                 return None
             kept.append(moved)
-        for one in touches:
-            if not one.active:
-                distance, still = self.closest.pairs[one.pair].distance, (False,) * len(one.at)
-                new = ContactPoint(*one.pair, one.at, still, distance, normal=one.normal, new=True, edge=one.edge)
-                kept.append(new)
+        kept += [self._new(one) for one in touches if not one.active]
         return Choice(points=tuple(self.run.lines.set_out(fields.model.mesh, kept)))
 
     def _at_ends(self, point: ContactPoint, ends: Sequence[_End]) -> ContactPoint | None:
@@ -578,4 +609,4 @@ def _touch(near: Near) -> _Touch:
 def _lying(places: Sequence[_At | ContactPoint]) -> str:
     """Why a path does not go on where members lie along something."""
     names = enumerated(sorted({f"contacts.{one.contact}" for one in places}))
-    return f"a member begins to lie along {names}, accepted on a path: members that touch at places only"
+    return f"members begin to lie along each other: {names}, accepted on a path: members that touch at places only"

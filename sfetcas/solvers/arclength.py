@@ -25,13 +25,14 @@ from ..mechanics.memory import Remembering
 from .between_states import turned_between
 from .neutral import Neutral
 from .newton import Balance, Limits, correct
+from .one_sided import Border
 from .prepared import Prepared, Solved
 from .redundancy import loose_rows, met, redundant, with_sharing
 from .residuals import relative_residual
 from .sharing import shared
 from .stability import LIGHT, Inertia
 
-__all__ = ["PASSING", "Curve", "Standing", "Tangent"]
+__all__ = ["PASSING", "Curve", "Standing", "Tangent", "bordered"]
 
 PASSING = 1e-10
 """Relative residual up to which intermediate points of a curve are iterated; points of an answer go to rounding."""
@@ -491,3 +492,8 @@ class _Across:
         """Whether an intermediate point is accurate enough; its gaps must be closed too, as small ones move much."""
         gaps = float(np.abs(here.point.residual[self.equations.unknowns :]).max(initial=0.0))
         return not self.sharp and here.residual <= PASSING and gaps <= tolerances.CONVERGED
+
+
+def bordered(curve: Curve, across: Tangent) -> Border:
+    """The factor as an unknown, and the equation that keeps steps orthogonal to a direction."""
+    return Border(curve.loading, curve.slope, curve.weight * across.z, across.factor / curve.unit**2)

@@ -3,11 +3,13 @@
 In each of Newton's steps the system is linear but for the choice: a row either acts, its gap zero and its push not
 below zero, or it does not, its push zero and its gap not below zero.  With all other unknowns eliminated that is a
 linear complementarity problem, which is solved by pivots from the rows that acted before, see
-:mod:`~sfetcas.mathematics.complementarity`.
+:mod:`~sfetcas.mathematics.complementarity`.  The factor of the loads may be one more unknown, and the place across a
+direction one more equation, see :class:`Border`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,15 +18,36 @@ from .. import tolerances
 from ..mathematics.arrays import Array, Index
 from ..mathematics.complementarity import by_pivots
 from ..mechanics.equations import Equations, Point, State
+from ..mechanics.loading import Loading
 from .newton import AtLoads, Balance
 
-__all__ = ["OneSided"]
+__all__ = ["Border", "OneSided"]
 
 AGAIN, TIMES = 1e-8, 2
 """Relative residual from which on a choice that was made so many times is taken: others differ from it by rounding."""
 
 ROUNDING = 1e-11
 """Share of the largest gap, and of the largest push, up to which a wrong sign is rounding."""
+
+
+@dataclass(frozen=True)
+class Border:
+    """An unknown factor of the loads, and the equation ``row . step + share (change of the factor) = 0`` for it.
+
+    Attributes
+    ----------
+    loading : callable
+        Factor -> Loading.
+    slope : callable
+        (state, factor, point) -> derivative (total,) of the residual by the factor.
+    row : ndarray (total,)
+    share : float
+    """
+
+    loading: Callable[[float], Loading]
+    slope: Callable[[State, float, Point], Array]
+    row: Array
+    share: float
 
 
 @dataclass(frozen=True)
@@ -37,11 +60,18 @@ class OneSided(AtLoads):
         Numbers of these rows among all rows: their residual is a gap, their multiplier minus the push.
     acting : ndarray (m,) of bool
         Which of them act; kept up to date by :meth:`step`.
+    border : Border, optional
+        Where the factor of the loads is an unknown.
     """
 
     pushing: Index = field(default_factory=lambda: np.zeros(0, np.intp))
     acting: Array = field(default_factory=lambda: np.zeros(0, bool))
+    border: Border | None = None
     _tried: dict[bytes, int] = field(default_factory=dict)
+
+    def loading(self, factor: float) -> Loading:
+        """The given loads, or those at the factor where that is an unknown."""
+        return self.loads if self.border is None else self.border.loading(factor)
 
     def seen(self, state: State, point: Point) -> Point:
         """The equations with pulls of rows that act, and gaps of those that do not where they are below zero."""
@@ -53,29 +83,37 @@ class OneSided(AtLoads):
         return replace(seen, residual=residual)
 
     def step(self, here: Balance) -> Array:
-        """Newton's step (total,), dimensionless, to the rows that act then."""
+        """Newton's step, dimensionless, to the rows that act then: (total,), or (total + 1,) with the factor last."""
         equations, rows, forces = self.equations, self.equations.unknowns + self.pushing, here.state.lam[self.pushing]
         point = super().seen(here.state, here.plain)
-        moved = self._moved(point, rows)
+        slope = np.zeros(equations.total)
+        if self.border is not None:
+            slope = self.border.slope(here.state, here.loading.factor, point)
+        moved, factor = self._moved(point, rows, slope)
         # Pushes of rows that act, gaps of those that do not.
-        gaps, pushes = _times(equations, point.entries, moved, rows), -moved[rows]
+        gaps, pushes = _times(equations, point.entries, moved, rows) + np.outer(slope[rows], factor), -moved[rows]
         gaps[:, 0] += point.residual[rows]
         pushes[:, 0] -= forces
         basic = np.where(self.acting[:, None], pushes, gaps)
         found = by_pivots(basic[:, 1:], basic[:, 0])
         if found is None:
-            return self._without_flat(moved[:, 0])
+            return self._with_factor(moved[:, 0], factor[0])
         self.acting[found > 0.0] ^= True
         if here.residual <= AGAIN:
             chosen = self.acting.tobytes()
             self._tried[chosen] = self._tried.get(chosen, 0) + 1
-        step = moved @ np.append(1.0, found)
+        chosen = np.append(1.0, found)
+        step = moved @ chosen
         step[rows[~self.acting]] = -forces[~self.acting]
-        return self._without_flat(step)
+        return self._with_factor(step, factor @ chosen)
 
-    def _moved(self, point: Point, rows: Index) -> Array:
+    def _with_factor(self, step: Array, factor: float) -> Array:
+        step = self._without_flat(step)
+        return step if self.border is None else np.append(step, factor)
+
+    def _moved(self, point: Point, rows: Index, slope: Array) -> tuple[Array, Array]:
         """Newton's step with the rows that act, and what a push of each other row, or a gap of each of these, changes:
-        columns (total, 1 + m).
+        columns (total, 1 + m), and the change of the factor with each (1 + m,).
         """
         equations = self.equations
         idle = np.zeros(equations.total, bool)
@@ -83,15 +121,20 @@ class OneSided(AtLoads):
         entries = np.where(idle[equations.row] | idle[equations.column], 0.0, point.entries)
         entries[equations.diagonal[rows[~self.acting]]] = -1.0
         equations.solver.factor(equations.regularised(entries, tolerances.PROXIMAL * self.weight, tolerances.DUAL))
-        right = np.zeros((equations.total, 1 + len(rows)))
-        right[:, 0] = np.where(idle, 0.0, -point.residual)
+        right = np.zeros((equations.total, 2 + len(rows)))
+        right[:, 0], right[:, -1] = np.where(idle, 0.0, -point.residual), np.where(idle, 0.0, -slope)
         for k, row in enumerate(rows.tolist(), 1):
             if idle[row]:
                 mine = (equations.column == row) & ~idle[equations.row]
                 right[equations.row[mine], k] = point.entries[mine]
             else:
                 right[row, k] = 1.0
-        return equations.solver.solve(right)
+        moved = equations.solver.solve(right)
+        moved, rate = moved[:, :-1], moved[:, -1]
+        if self.border is None:
+            return moved, np.zeros(moved.shape[1])
+        factor = -(self.border.row @ moved) / (float(self.border.row @ rate) + self.border.share)
+        return moved + np.outer(rate, factor), factor
 
     def suffices(self, here: Balance) -> bool:
         """Whether choices come again and again that differ by rounding."""

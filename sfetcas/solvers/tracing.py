@@ -22,7 +22,21 @@ from .critical import LARGEST_PRIMAL_FACTOR, ONE_EVENT, Event, events_between, s
 from .newton import largest_rotation
 from .residuals import relative_residual
 
-__all__ = ["FAR", "Traced", "full_shape", "passes", "switched", "trace", "without"]
+__all__ = [
+    "FAR",
+    "FIRST",
+    "SHARE",
+    "SHORTEST",
+    "STRIDE",
+    "TURNING",
+    "Traced",
+    "full_shape",
+    "longest",
+    "passes",
+    "switched",
+    "trace",
+    "without",
+]
 
 TURNING = 0.25
 """Angle between the tangents of neighbouring points, rad, that steps aim at."""
@@ -293,7 +307,7 @@ class _Piece:
 
     def trial(self, now: Standing, length: float) -> tuple[Standing | None, float]:
         """The next point, None if the step is refused, and the length of the next step."""
-        curve, length = self.curve, min(length, _longest(self.curve, now, self.stride))
+        curve, length = self.curve, min(length, longest(self.curve, now, self.stride))
         there, left = _ahead(curve, now, self.before, length, self.span)
         if there is not None and self.passed is not None and self.passed(now, there):
             return None, 0.5 * length
@@ -378,7 +392,8 @@ def _to_start(curve: Curve, start: Standing, now: Standing, there: Standing) -> 
     return [replace(start, arc=now.arc + curve.way(now, start))]
 
 
-def _longest(curve: Curve, now: Standing, stride: float) -> float:
+def longest(curve: Curve, now: Standing, stride: float) -> float:
+    """The longest step from a point: no node turns by more than a stride, nor does the factor change by more."""
     turning = largest_rotation(curve.equations, now.tangent.z)
     return min(STRIDE / max(turning, TINY), stride / max(abs(now.tangent.factor), TINY))
 
