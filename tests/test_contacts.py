@@ -7,7 +7,7 @@ import pytest
 from scenes import SOFT, made
 
 from sfetcas import Scene, SceneError, SolveError, Status, load, solve
-from sfetcas.contact.touches import Touched, edge_sides
+from sfetcas.contact.closest import Closest
 from sfetcas.description.obstacles import obstacle
 from sfetcas.description.scene import Contact
 from sfetcas.equilibria.quantities import value_of
@@ -88,14 +88,21 @@ def balance(step):
 
 def smallest_gap(step):
     """Smallest gap at very many places of all members, m."""
-    touched, found = Touched.of(step.fields), []
+    closest, found = Closest(step.model.scene), []
     for name, contact in step.model.scene.contacts.items():
         if obstacle(contact, step.model.space).kind == "sharp":
-            found.append(touched.smallest_gap(name, edge_sides(step.model.scene)))
+            pairs = [pair for pair in closest.pairs.values() if pair.contact == name]
+            found += [min((near.gap for near in closest.found(step.fields, np.inf, pairs)), key=abs, default=np.inf)]
             continue
         for member in step.model.members if contact.members == "all" else [contact.member]:
-            found.append(touched.gaps(name, member, np.linspace(0.0, 1.0, 5003), 0.0).min())
+            found.append(gaps(step, name, member, 5003).min())
     return min(found)
+
+
+def gaps(step, name, member, count):
+    """Gaps (count,) along a member, m."""
+    x = np.linspace(0.0, 1.0, count)
+    return step.model.scene.obstacles[name].gaps(step.fields.positions(member, x), step.fields.tangents(member, x))
 
 
 # -- closed forms ---------------------------------------------------------------------------------------
@@ -217,26 +224,9 @@ CASES = {
 every = pytest.mark.parametrize("name", CASES)
 
 
-def end_pushes(touched, touch):
-    """Concentrated forces at the inner ends of a stretch along the normals there."""
-    found = []
-    for at, way in ((touch.at, -1.0), (touch.to, 1.0)):
-        if 0.0 < at < 1.0:
-            inside = touched.fields.along(touch.member, np.array([at]))["force"][0]
-            found.append(way * (inside - touched._beside(touch, at, way)) @ touched.normal(touch, at))
-    return found
-
-
 def pushes(step):
     """Forces of all touches along the normals."""
-    if step.model.mesh.points:
-        return np.array([step.fields.contact_point(point)["push"] for point in step.model.mesh.points])
-    touched = Touched.of(step.fields)
-    found = [touched.push(t) for t in step.model.mesh.touches if t.to is None]
-    for touch in step.model.mesh.touches:
-        if touch.to is not None:
-            found += end_pushes(touched, touch)
-    return np.array(found)
+    return np.array([step.fields.contact_point(point)["push"] for point in step.model.mesh.points])
 
 
 @every
@@ -593,7 +583,6 @@ def test_plane_may_be_given_by_its_other_normal():
 @pytest.mark.parametrize(
     ("analysis", "sentence"),
     [
-        ({"type": "path", "range": [0, 1], "branches": 1}, r"^analysis\.branches: found 1 with contacts"),
         ({"equilibria": "all"}, r"^analysis\.equilibria: found 'all' with contacts"),
     ],
 )
@@ -806,9 +795,7 @@ def lying_in_two(**loads):
 def test_beam_lifts_off_where_a_load_turns_or_pulls_it(load):
     """An obstacle holds neither moment nor pull: the beam rises around the load, and all forces balance."""
     step = solve(made(lying_in_two(extra=load)), accuracy=1e-6).last
-    gaps = Touched.of(step.fields)
-    highest = max(gaps.gaps("floor", name, np.linspace(0.0, 1.0, 201), 0.0).max() for name in ("m", "n"))
-    assert highest > 1e-5
+    assert max(gaps(step, "floor", name, 201).max() for name in ("m", "n")) > 1e-5
     assert smallest_gap(step) > -2e-6  # the accuracy of the positions, of 2 m
     up = float(np.sum(np.atleast_2d(step.contacts["floor"]["force"]), axis=0)[1]) + step.reaction("A")[0][1]
     assert up == pytest.approx(

@@ -290,8 +290,3 @@ def test_wrong_input_is_told_in_one_sentence(contact, sentence):
     with pytest.raises(SceneError, match=sentence) as told:
         made(over(contact))
     assert "\n" not in str(told.value)
-
-
-def test_equilibria_on_edges_go_by_points_and_paths_do_not():
-    assert made(over(edge(0.5, -0.05))).touches_at_points
-    assert not made(over(edge(0.5, -0.05), analysis={"type": "path", "range": [0, 1]})).touches_at_points

@@ -1,7 +1,6 @@
 """Members pass no obstacle: the loads are followed from zero, and steps are short where one may have been passed."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +8,6 @@ from scenes import SOFT, made
 
 from sfetcas import SceneError, solve
 from sfetcas.checks import check
-from sfetcas.contact.passing import Course, Passing
-from sfetcas.description.obstacles import obstacle
 
 FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}
 
@@ -79,48 +76,6 @@ def test_the_answer_does_not_depend_on_steps():
     table["analysis"] = {"steps": [0.3, 0.6, 1.0]}
     one, many = solve(made(lever([0, 12], peg(0.8, 0.3, 0.1)))).last, solve(made(table)).last
     np.testing.assert_allclose(many.position("B"), one.position("B"), atol=2e-5)
-
-
-class Stand:
-    """In the place of contact at a state: only where its members are."""
-
-    def __init__(self, fields):
-        self.fields = fields
-
-
-def moved(angle, *, center=(0.5, 0.5), radius=0.05, **touching):
-    """Whether a straight lever that turns by an angle from the x axis may have passed a circle."""
-    scene = made(lever([0, 1], peg(*center, radius)))
-    passing = Passing(scene, {"stop": obstacle(scene.contacts["stop"], False)})
-    x = passing.fractions["m"]
-
-    def held(turn):
-        way = np.array([math.cos(turn), math.sin(turn), 0.0])
-        fields = SimpleNamespace(
-            positions=lambda name, s: s[:, None] * way, tangents=lambda name, s: np.tile(way, (len(s), 1))
-        )
-        touched = Stand(fields)
-        return SimpleNamespace(touched=touched, mesh=SimpleNamespace(touches=()))
-
-    assert len(x) > 4.0 / radius / 4.0
-    return passing.possible(held(angle[0]), held(angle[1]), {})
-
-
-def test_steps_over_an_obstacle_are_seen_and_steps_beside_it_are_not():
-    at = math.pi / 4.0  # direction of the circle, which covers about 0.07 rad to either side
-    assert moved((at - 0.2, at + 0.2))
-    assert not moved((0.0, 0.3))
-    assert not moved((at + 0.1, at + 0.4))
-    # The ends are clear, and so is every chord: what the tip draws is an arc that bulges into the circle.
-    beyond = {"center": (1.03 * math.cos(0.2), 1.03 * math.sin(0.2)), "radius": 0.04}
-    assert moved((0.0, 0.4), **beyond)
-    assert not moved((0.0, 0.1), **beyond)
-
-
-def test_turned_is_the_largest_angle():
-    x, y = np.eye(3)[:2]
-    one, other = Course({"m": np.zeros((2, 3))}, {"m": np.array([x, x])}), np.array([x, (x + y) / math.sqrt(2.0)])
-    assert one.turned(Course({"m": np.zeros((2, 3))}, {"m": other})) == pytest.approx(math.pi / 4.0)
 
 
 # -- moments and forces at nodes that touch --------------------------------------------------------

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sfetcas import Scene, SceneError, SolveError, Status, load, solve, switch
+from sfetcas import Scene, SceneError, Status, load, solve, switch
 
 ACCURACY = 1e-7
 
@@ -332,25 +332,17 @@ def test_a_thin_arch_on_a_thicker_peg_is_the_same(arch):
     )
 
 
-def test_what_lies_along_a_floor_is_followed_in_the_older_way():
-    floor = {"type": "plane", "point": [0, -0.05], "normal": [0, 1]}
-    found = cantilever(floor, loads={"w": {"type": "distributed", "member": "a", "value": [0, -1]}})
-    path = path_of(found, [0, 30], steps=[30.0], accuracy=1e-6)
-    assert any("bifurcations and branches are not looked for" in note for note in path.notes)
-    begin, end = path.steps[0].contacts["c"]["at"]
-    assert 0.0 < begin < end == 1.0
-
-
 def test_a_column_between_walls():
     """Buckled against a wall, it begins to lie along it at four times Euler's load (Domokos, Holmes, Royce 1997)."""
     path = solve(load("problems/column_between_walls.toml"))
     euler = np.pi**2
     assert [e.factor for e in path.main.bifurcations] == pytest.approx([euler, 4.0 * euler], rel=1e-6)
     for branch, name in zip(path.branches[1:], ("upper", "lower"), strict=True):
-        assert [e.changes for e in branch.transitions] == [(f"contacts.{name} touches column at 0.5",)]
-        assert f"a member begins to lie along contacts.{name}" in branch.end
+        touches, lies = branch.transitions
+        assert touches.changes == (f"contacts.{name} touches column at 0.5",)
+        assert lies.changes == (f"column begins to lie along contacts.{name}",)
         # Where slopes are small; here they are 0.16, whose square is 0.025.
-        assert branch.factors[-1] == pytest.approx(4.0 * euler, rel=0.01)
+        assert lies.factor == pytest.approx(4.0 * euler, rel=0.01)
         assert {stable for stable, _, _ in branch.stretches()} == {True}
 
 
@@ -401,20 +393,6 @@ def test_a_thin_peg_is_not_passed_between_two_points():
 # -- what is refused, and how paths end -----------------------------------------------------------
 
 
-def test_a_member_that_begins_to_lie_along_a_floor_ends_the_path():
-    floor = {"type": "plane", "point": [0, -0.1], "normal": [0, 1], "member_radius": 0.05}
-    path = path_of(cantilever(floor, loads={"w": {"type": "distributed", "member": "a", "value": [0, -1]}}), [0, 30])
-    assert path.status is Status.CUT
-    assert "a member begins to lie along contacts.c" in path.main.end
-    assert len(path.transitions) == 1
-
-
-def test_a_beam_that_lies_on_a_floor_from_the_start_is_told():
-    floor = {"type": "plane", "point": [0, -0.05], "normal": [0, 1], "member_radius": 0.05}
-    with pytest.raises(SolveError, match=r"a member begins to lie along contacts\.c"):
-        path_of(cantilever(floor, loads={"w": {"type": "distributed", "member": "a", "value": [0, -1]}}), [0, 1])
-
-
 def test_a_node_that_is_driven_onto_an_obstacle_ends_the_path():
     floor = {"type": "plane", "point": [0, -0.3], "normal": [0, 1], "member_radius": 0.05}
     found = cantilever(floor, loads={}, motions={"m": {"node": "A", "displacement": [0, -1]}})
@@ -444,10 +422,3 @@ def test_edge_with_a_radius_of_members():
 def test_what_paths_with_radii_are_not_for(contact, analysis, sentence):
     with pytest.raises(SceneError, match=sentence):
         path_of(cantilever(DRUM | contact, sections={"s": {"EI3": 1.0, "rhoA": 1.0}}), [0, 1], **analysis)
-
-
-def test_edges_beside_what_touches_at_points_are_refused():
-    table = cantilever(DRUM)
-    table["contacts"]["e"] = {"type": "point", "position": [0.4, -0.05], "side": [0, 1], "member": "a"}
-    with pytest.raises(SceneError, match="beside the edge 'e' on a path, accepted: with its 'member_radius'"):
-        path_of(table, [0, 1])

@@ -151,7 +151,7 @@ class Edges:
         return bool((ways * (normals @ force)).max() < -ROUNDING)
 
     def outwards(self, fields: Fields, point: ContactPoint, pair: Pair, end: int) -> float:
-        """Share of the push on a point at an end of a member that is not into that: where it is below zero it slides."""
+        """Share of the push at an end of a member that is out of it; where it is below zero a point slides in."""
         return -float(_direction(fields.contact_point(point)["force"]) @ self._inwards(fields, pair, end))
 
     def slides_off(self, pair: Pair, end: int) -> bool:

@@ -67,15 +67,11 @@ class Obstacle:
     side: Array | None = None
     carrier: str | None = None
 
-    def gaps(self, points: Array, tangents: Array, offset: float = 0.0, way: float = 1.0) -> Array:
+    def gaps(self, points: Array, tangents: Array, way: float = 1.0) -> Array:
         """Distances (n,), m, of points (n, 3) of a member, negative inside; of an edge along the member's normal."""
         if self.kind == "round":
-            return self.sign * (np.linalg.norm((points - self.place) @ self.across, axis=1) - self.radius) + offset
-        normals = self.normals(points, tangents, way)
-        if self.side is not None:
-            points = points + offset * unit(self.side)
-            return np.einsum("ni,ni->n", points - self.place, normals)
-        return np.einsum("ni,ni->n", points - self.place, normals) + offset
+            return self.sign * (np.linalg.norm((points - self.place) @ self.across, axis=1) - self.radius)
+        return np.einsum("ni,ni->n", points - self.place, self.normals(points, tangents, way))
 
     def normals(self, points: Array, tangents: Array, way: float = 1.0) -> Array:
         """Unit normals (n, 3), fixed axes, towards the side on which members are allowed."""

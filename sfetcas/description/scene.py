@@ -306,16 +306,6 @@ class Scene(Record):
         return springs or any(tendon.may_be_slack for tendon in self.tendons.values())
 
     @property
-    def touches_at_points(self) -> bool:
-        """Whether it is an unknown where members touch, see :mod:`sfetcas.mechanics.contact_points`.
-
-        In load steps they are; elsewhere where touches as conditions of elements lack what there is.
-        """
-        if any(_why_points(self, name) for name in self.contacts):
-            return True
-        return bool(self.contacts) and self.analysis.type in ("static", "modes")
-
-    @property
     def rubs(self) -> bool:
         """Whether there is friction where members touch, so that the order of the steps matters."""
         return any(contact.friction > 0.0 for contact in self.contacts.values())
@@ -965,15 +955,14 @@ def _check_moving(scene: Scene) -> None:
 
 def _check_contacts(scene: Scene) -> None:
     space = scene.resolved_dimension == "space"
-    for name, spring in scene.springs.items():
-        if spring.stop is not None and scene.contacts and scene.analysis.type == "path":
-            message = "found a stop with contacts on a path, accepted: with analysis.type = 'static' and steps"
-            raise SceneError(message, ("springs", name, "stop"))
-    if scene.contacts and scene.analysis.branches and not scene.touches_at_points:
-        message = (
-            f"found {scene.analysis.branches} with contacts, accepted: 0, as bifurcations in contact are not located"
-        )
-        raise SceneError(message, ("analysis", "branches"))
+    if scene.contacts and scene.analysis.type == "path":
+        accepted = "with contacts on a path, accepted: with analysis.type = 'static' and steps"
+        for name, spring in scene.springs.items():
+            if spring.stop is not None:
+                raise SceneError(f"found a stop {accepted}", ("springs", name, "stop"))
+        for name, tendon in scene.tendons.items():
+            if tendon.may_be_slack:
+                raise SceneError(f"found one that may be slack {accepted}, or pushes = true", ("tendons", name))
     if scene.contacts and scene.analysis.equilibria == "all":
         message = "found 'all' with contacts, accepted: 'one'; a node's 'start' chooses among several"
         raise SceneError(message, ("analysis", "equilibria"))
@@ -1035,8 +1024,6 @@ def _check_carried(scene: Scene, name: str, node: str) -> None:
 
 def _check_points(scene: Scene) -> None:
     """Refuse what is not solved together with contact whose places are unknowns."""
-    if not scene.touches_at_points:
-        return
     reasons = ((name, _why_points(scene, name)) for name in scene.contacts)
     name, what = next(((name, why) for name, why in reasons if why), ("", ""))
     if not what:
@@ -1053,10 +1040,6 @@ def _check_points(scene: Scene) -> None:
     for edge, stop in scene.obstacles.items():
         if stop.kind == "sharp" and scene.contacts[edge].friction > 0.0:
             raise SceneError("found friction on an edge, accepted: with 'member_radius', or none", ("contacts", edge))
-        if stop.kind == "sharp" and on_path and scene.contacts[edge].member_radius == 0.0:
-            raise SceneError(f"{found} beside the edge {edge!r} on a path, accepted: with its 'member_radius'", where)
-    if scene.stopped and on_path:
-        raise SceneError(f"{found} beside stops or tendons that may be slack, accepted: one of these", where)
     if scene.rubs and scene.stopped:
         # What is taut and at a stop is found for each step by itself, friction is that of all steps before it.
         where = ("contacts", next(name for name, contact in scene.contacts.items() if contact.friction > 0.0))

@@ -285,10 +285,6 @@ class Member(Record):
         law = sections[str(self.section)].law if self.type == "flexible" else None
         return law is not None and law.remembers
 
-    def node_at(self, x: float) -> str | None:
-        """The node at an end of a flexible or rigid member, at the fraction 0 or 1 of its length; None within it."""
-        return self.nodes[int(x)] if x in (0.0, 1.0) else None
-
     @model_validator(mode="before")
     @classmethod
     def _released(cls, values: Any) -> Any:

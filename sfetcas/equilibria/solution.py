@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ..contact import closest, touches
+from ..contact import closest
 from ..description.answers import STATICS, outlined
 from ..description.records import brief, counted, nearest, plain
 from ..description.showing import (
@@ -320,9 +320,7 @@ class Configuration:
         scene = self.model.scene
         if not scene.contacts:
             return {}
-        if scene.touches_at_points or self.model.mesh.points:
-            return closest.answers(self.fields, self.closeness)
-        return touches.answers(self.fields)
+        return closest.answers(self.fields, self.closeness)
 
     def pushes(self, contact: str) -> list[tuple[str, float, Array]]:
         """Where an obstacle pushes: member, fraction of its length, of a stretch its middle, and force (3,), N."""

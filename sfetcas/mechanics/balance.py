@@ -107,10 +107,6 @@ class Balance:
             return force, self._rigid.get(("node", node), np.zeros(3))
         return force, sum((fixed @ moments[turn] for turn, fixed in self._reactions.turned(node)), np.zeros(3))
 
-    def fixed_share(self, number: int, moment: Array) -> Array:
-        """The part of a moment (3,) on a rotation that the ground takes: none about axes that are free."""
-        return self._reactions.fixed_directions(number) @ moment
-
     def starting_moments(self, elements: slice) -> Array:
         """Moments (n, 3) that the surroundings exert on the first nodes of elements and what runs along them."""
         return self._three(self._on_elements[elements])
@@ -186,11 +182,6 @@ class Balance:
     def _rigid(self) -> dict[tuple[str, str], Array]:
         """Moments on first ends of rigid members, and reactions of nodes that share a rotation."""
         return {key: self._three(found) for key, found in self._reactions.rigid.solved(self._cells).items()}
-
-    def spring_moment(self, node: str) -> Array:
-        """Moment (3,) that rotational springs at a node take from it."""
-        found = [self._cells[cells] for cells in self._reactions.connected(node)]
-        return self._three(np.sum(found, axis=0)) if found else np.zeros(3)
 
     # -- springs and small members ----------------------------------------------------------------
 

@@ -8,24 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import tolerances
-from ..description.obstacles import Obstacle, takes_part
+from ..description.obstacles import Obstacle
 from ..description.scene import Scene
 from ..description.structure import SLIDING
 from ..description.supports import turned_about
 from ..mathematics.arrays import Array, Index, normals, numbers, unit
 from .beams import Scales
 from .bodies import BodyData, body_of
-from .contact_joints import (
-    Along,
-    AlongRound,
-    Bent,
-    Facing,
-    OnEdge,
-    OnPlane,
-    OnRound,
-    Sticking,
-    directions_along,
-)
+from .contact_joints import Facing, OnPlane, OnRound, Sticking, directions_along
 from .elements import Element
 from .joints import (
     Body,
@@ -40,13 +30,13 @@ from .joints import (
     TurnStop,
     Universal,
 )
-from .mesh import Mesh, Spot, Touch
+from .mesh import Mesh, Spot
 from .parts import Parts
-from .rotations import Pin, RotationFreedom, Rotations, end_joints
+from .rotations import Pin, Rotations, end_joints
 from .segments import Segments
 from .terms import GROUND, Group, One
 
-__all__ = ["anchored", "body_numbers", "connections_in", "connections_of", "freedoms", "touches_in"]
+__all__ = ["body_numbers", "connections_in", "connections_of", "freedoms", "stopped_in"]
 
 
 def connections_in(parts: Parts) -> Iterator[One]:
@@ -56,9 +46,9 @@ def connections_in(parts: Parts) -> Iterator[One]:
     yield from maker.stops(parts.mesh)
 
 
-def touches_in(parts: Parts) -> Iterator[One]:
-    """Terms of contacts with obstacles."""
-    yield from _Toucher(parts.scene, parts.mesh, parts.segments, parts.rotations, parts.element, parts.scales).all()
+def stopped_in(parts: Parts) -> Iterator[One]:
+    """Terms of places that obstacles stop in a motion."""
+    yield from _Stopper(parts.scene, parts.mesh, parts.segments, parts.rotations, parts.element, parts.scales).all()
 
 
 def connections_of(groups: Sequence[Group], table: str, name: str) -> Iterator[tuple[int, int]]:
@@ -226,8 +216,8 @@ class _Maker:
 
 
 @dataclass(frozen=True, eq=False)
-class _Toucher:
-    """What touches obstacles: a place on each, and along stretches the directions of the sections."""
+class _Stopper:
+    """Places that obstacles stop in a motion."""
 
     scene: Scene
     mesh: Mesh
@@ -237,45 +227,11 @@ class _Toucher:
     scales: Scales
 
     def all(self) -> Iterator[One]:
-        """Every touch of the mesh; what is held or lies there already needs no row."""
-        covered: set[tuple[str, int]] = set()
-        for touch in self.mesh.touches:
-            stop = self.scene.obstacles[touch.contact]
-            if touch.to is None:
-                yield self._on(touch, stop)
-                yield from self._lying(touch, stop, covered) if touch.flat else ()
-                continue
-            ends = [(touch.contact, self.place(touch, at)) for at in touch.places if at in (0.0, 1.0)]
-            if anchored(self.scene, touch, stop) and not covered & set(ends):
-                yield self._on(touch, stop)
-            yield from self._lying(touch, stop, covered)
-            covered |= set(ends)
+        """Every place of the mesh."""
         for spot in self.mesh.spots or ():
             yield self._stopped(spot)
             if spot.rubs:
                 yield self._sticking(spot)
-
-    def place(self, touch: Touch, at: float) -> int:
-        """Number of the place of a touch."""
-        if at in (0.0, 1.0):
-            return self.segments.place(self.segments.ends[touch.member, int(at)])
-        return self.segments.place(touch.name)
-
-    def _on(self, touch: Touch, stop: Obstacle) -> One:
-        axes, unit = self.element.axes, self.scales.length
-        start = self.scene.center_lines[touch.member].positions(np.array([touch.at]))[0] - stop.place
-        places = (self.place(touch, touch.at),)
-        if stop.kind == "flat":
-            data = self._flat(stop, start, touch.offset)
-            return One(OnPlane(axes == 3), touch.name, "", data, (), places, touch.name)
-        if stop.kind == "round":
-            data = self._round(stop, start, touch.offset)
-            return One(OnRound(axes == 3), touch.name, "", data, (), places, touch.name)
-        turns, _ = self._chain(touch)
-        tangent = self.scene.center_lines[touch.member].tangents(np.array([touch.at]))[0]
-        start = start + touch.offset * stop.side / np.linalg.norm(stop.side) if stop.side is not None else start
-        data = np.concatenate([stop.normal, tangent, start[:axes] / unit, [touch.way]])
-        return One(OnEdge(axes == 3), touch.name, "", data, (int(turns[0]),), places, touch.name)
 
     def _stopped(self, spot: Spot) -> One:
         """A place that an obstacle stops in a motion."""
@@ -283,7 +239,7 @@ class _Toucher:
         stop = self.scene.obstacles[spot.contact]
         start = self.scene.center_lines[spot.member].positions(np.array([spot.at]))[0] - stop.place
         flat = stop.kind == "flat"
-        data = self._flat(stop, start, 0.0) if flat else self._round(stop, start, 0.0)
+        data = self._flat(stop, start) if flat else self._round(stop, start)
         carried = stop.carrier is not None
         kind = OnPlane(space, carried) if flat else OnRound(space, carried)
         return self._facing(kind, spot, stop, data, spot.name)
@@ -308,62 +264,15 @@ class _Toucher:
         data = np.append(directions_along(normal), np.zeros((axes - 1, 1)), axis=1).ravel()
         return self._facing(Sticking(self.element.space, stop.carrier is not None), spot, stop, data, spot.along)
 
-    def _flat(self, stop: Obstacle, start: Array, offset: float) -> Array:
+    def _flat(self, stop: Obstacle, start: Array) -> Array:
         """Data of a place on a plane; ``start`` is where it begins, from the obstacle's place, m."""
-        return np.append(stop.normal[: self.element.axes], (start @ stop.normal + offset) / self.scales.length)
+        return np.append(stop.normal[: self.element.axes], start @ stop.normal / self.scales.length)
 
-    def _round(self, stop: Obstacle, start: Array, offset: float) -> Array:
+    def _round(self, stop: Obstacle, start: Array) -> Array:
         """Data of a place on something round."""
         axes, unit = self.element.axes, self.scales.length
         across = stop.across[:axes, :axes].T.ravel()
-        return np.concatenate([across, start[:axes] / unit, [(stop.radius - stop.sign * offset) / unit, stop.sign]])
-
-    def _lying(self, touch: Touch, stop: Obstacle, covered: set[tuple[str, int]]) -> Iterator[One]:
-        """Sections along a stretch; ``covered`` collects, by negative numbers, rotations that are done."""
-        axes, name = self.element.axes, f"{touch.name} along"
-        turns, x = self._chain(touch)
-        line = self.scene.center_lines[touch.member]
-        tangents = line.tangents(x)[:, :axes]
-        if stop.kind == "flat":
-            for turn, tangent in zip(turns.tolist(), tangents, strict=True):
-                key = (touch.contact, -2 - turn)
-                if self.rotations.kind[turn] != RotationFreedom.FIXED and key not in covered:
-                    covered.add(key)
-                    data = np.concatenate([stop.normal[:axes], tangent])
-                    yield One(Along(axes == 3), name, "", data, (turn,), row=name)
-            return
-        start = (line.positions(x[:1])[0] - stop.place)[:axes] / self.scales.length
-        if self.rotations.kind[turns[0]] != RotationFreedom.FIXED:
-            data = np.concatenate([start, tangents[0]])
-            yield One(AlongRound(False), name, "", data, (int(turns[0]),), (self.place(touch, touch.at),), name)
-        rest = np.unwrap(np.arctan2(tangents[:, 1], tangents[:, 0]))
-        radius = stop.radius - stop.sign * touch.offset
-        angles = touch.way / radius * (x - x[0]) * line.length - (rest - rest[0])
-        for turn, angle in zip(turns[1:].tolist(), angles[1:], strict=True):
-            yield One(Bent(False), name, "", np.array([angle]), (int(turns[0]), turn), row=name)
-
-    def _chain(self, touch: Touch) -> tuple[Index, Array]:
-        """Rotations along a stretch, and the fractions at which they stand."""
-        first = 0
-        for name, cuts in ((name, self.mesh.cuts.get(name)) for name in self.scene.members):
-            if name == touch.member:
-                break
-            first += 0 if cuts is None else len(cuts) - 1
-        cuts = self.mesh.cuts[touch.member]
-        a, b = (self.mesh.cut_at(touch.member, at) for at in (touch.at, touch.places[-1]))
-        if a == b:
-            last = a == len(cuts) - 1
-            number = self.rotations.turns[first + a - last, -1 if last else 0]
-            return np.array([number], dtype=np.intp), cuts[a : a + 1]
-        inner = cuts[a:b, None] + np.diff(cuts[a : b + 1])[:, None] * self.element.nodes[:-1]
-        return self.rotations.chain(slice(first + a, first + b)), np.append(inner.ravel(), cuts[b])
-
-
-def anchored(scene: Scene, touch: Touch, stop: Obstacle) -> bool:
-    """Whether the end of a contact stretch needs a constraint onto the obstacle: not where a support fixes it there."""
-    nodes = scene.members[touch.member].nodes
-    ends = [nodes[int(at)] for at in touch.places if at in (0.0, 1.0)]
-    return all(takes_part(end, scene.nodes[end], scene.motions.values(), stop) for end in ends)
+        return np.concatenate([across, start[:axes] / unit, [stop.radius / unit, stop.sign]])
 
 
 def body_numbers(body: BodyData, space: bool, scales: Scales) -> tuple[Array, int]:

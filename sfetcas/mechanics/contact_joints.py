@@ -1,4 +1,4 @@
-"""Terms of contact with obstacles: constraints that keep places and sections on an obstacle, and penalty energies.
+"""Terms of contact with obstacles in motions: constraints that keep places on an obstacle, or where they stick.
 
 They are terms as joints are, see :mod:`~sfetcas.mechanics.joints`.  All data are dimensionless.
 """
@@ -15,17 +15,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from .terms import Side, Term
 
-__all__ = [
-    "Along",
-    "AlongRound",
-    "Bent",
-    "Facing",
-    "OnEdge",
-    "OnPlane",
-    "OnRound",
-    "Sticking",
-    "directions_along",
-]
+__all__ = ["Facing", "OnPlane", "OnRound", "Sticking", "directions_along"]
 
 CENTRE = 1e-60
 """Added to the square of a distance, dimensionless: below rounding wherever the distance is not itself nothing."""
@@ -171,74 +161,3 @@ def _gap_of_round(u: Side, data: ca.SX) -> ca.SX:
     # At the centre itself, where a bar across a bowl may be, the distance still has derivatives.
     distance = ca.sqrt(ca.sumsqr(out) + CENTRE)
     return data[n * n + n + 1] * (distance - data[n * n + n])
-
-
-@final
-@dataclass(frozen=True)
-class OnEdge(Term):
-    """Constraint: a section touches an edge; data: edge direction, undeformed tangent, edge to place, side.
-
-    The gap is measured across the edge and the tangent of the section.  It is the distance where the place is the one
-    nearest to the edge, and then the contact force acts at the place.
-    """
-
-    @property
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """One row."""
-        return 1, 1, 1, 6 + self.axes + 1, 0
-
-    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """The gap."""
-        tangent = ca.vertcat(*self.forth(q[0], ca.vertsplit(data[3 : 3 + self.axes])))
-        tangent = tangent if self.space else ca.vertcat(tangent, 0.0)
-        across = ca.cross(data[:3], tangent)
-        across = data[6 + self.axes] * across / ca.norm_2(across)
-        return [ca.dot(across[: self.axes], ca.vertcat(*u[0]) + data[6 : 6 + self.axes])]
-
-
-@final
-@dataclass(frozen=True)
-class Along(Term):
-    """Constraint: the tangent of a section lies in a plane; data: normal of the plane, undeformed tangent."""
-
-    @property
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """One row."""
-        return 1, 0, 1, 2 * self.axes, 0
-
-    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """Sine of the angle to the plane."""
-        n = self.axes
-        return [ca.dot(data[:n], ca.vertcat(*self.forth(q[0], ca.vertsplit(data[n:]))))]
-
-
-@final
-@dataclass(frozen=True)
-class AlongRound(Term):
-    """Constraint: a section is tangential to a circle; data: centre to place, undeformed tangent.  Plane only."""
-
-    @property
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """One row."""
-        return 1, 1, 1, 2 * self.axes, 0
-
-    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """Sine of the angle to the tangent of the circle."""
-        n = self.axes
-        out = ca.vertcat(*u[0]) + data[:n]
-        return [ca.dot(out, ca.vertcat(*self.forth(q[0], ca.vertsplit(data[n:])))) / ca.norm_2(out)]
-
-
-@final
-@dataclass(frozen=True)
-class Bent(Term):
-    """Constraint: the difference of two rotations, given by a circle between them; data: angle, rad.  Plane only."""
-
-    @property
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """One row."""
-        return 2, 0, 1, 1, 0
-
-    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """The difference of the angles less the given one."""
-        return [q[1][0] - q[0][0] - data]

@@ -31,7 +31,7 @@ from .load_terms import pull_within
 from .loading import Loading
 from .magnetism import magnet_terms
 from .memory import dissipated_along
-from .mesh import ContactPoint, Touch
+from .mesh import ContactPoint
 from .relaxation import carried, relax
 from .segments import beside_line, pulled_place, standing
 from .singles import fibre_strain
@@ -148,29 +148,7 @@ class Fields:
     def reaction(self, node: str) -> tuple[Array, Array]:
         """Force (3,) N and moment about the node (3,) N m that the ground exerts on a supported node."""
         force, moment = self.balance.reaction(node)
-        more_force, more_moment = self._pressed_at(node)
-        force, moment = force + more_force, moment + more_moment
         return force * self.model.scales.force, moment * self.model.scales.moment
-
-    def _pressed_at(self, node: str) -> tuple[Array, Array]:
-        """What an obstacle along a member takes over from a support at its end, dimensionless."""
-        force, moment = np.zeros(3), np.zeros(3)
-        place = self.model.segments.place(node)
-        # Where the obstacle has a row of its own for the node its share is told apart already.
-        if any(place in group.places for group in self.model.connections if group.kind.on_face):
-            return force, moment
-        for touch in self.model.mesh.touches:
-            nodes = self.model.scene.members[touch.member].nodes
-            for i, at in enumerate((0.0, 1.0)):
-                if touch.to is None or nodes[i] != node or at not in touch.places:
-                    continue
-                raw, laid = (self._along(touch.member, np.array([at]), pressed=pressed) for pressed in (False, True))
-                sign = 2.0 * i - 1.0
-                force = force + sign * (laid["force"][0] - raw["force"][0])
-                # What the support does not hold the rows of the obstacle take already.
-                turn = self.model.rotations.ends[touch.member][i]
-                moment = moment + self.balance.fixed_share(turn, sign * (laid["moment"][0] - raw["moment"][0]))
-        return force, moment
 
     def spring(self, name: str) -> SpringState:
         """State of a spring, in SI units."""
@@ -507,15 +485,15 @@ class Fields:
             found.append(batch(self.q, self._nodal, self.state.unwrapped, loads[number])[0][own])
         return np.concatenate(found)
 
-    def _along(self, member: str, x: Array, *, pressed: bool = True) -> dict[str, Array]:
-        """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted."""
-        return self._shared(member, x, pressed)[0]
+    def _along(self, member: str, x: Array) -> dict[str, Array]:
+        """Position (m), rotation, force and moment, dimensionless."""
+        return self._shared(member, x)[0]
 
     def taken(self, member: str, x: Array) -> Array:
         """Force (n, 3) that tendons along a member carry through its sections at fractions x, dimensionless."""
-        return self._shared(member, x, pressed=False)[1]
+        return self._shared(member, x)[1]
 
-    def _shared(self, member: str, x: Array, pressed: bool) -> tuple[dict[str, Array], Array]:
+    def _shared(self, member: str, x: Array) -> tuple[dict[str, Array], Array]:
         """As :meth:`_along`, and the force (n, 3) that tendons along the member carry beside the section."""
         model = self.model
         part = model.elements_of(member)
@@ -534,9 +512,6 @@ class Fields:
         if stretches_of(model.scene, member):
             about, taken = self._strung(member, x, rotation, moment)
             moment, force = moment - about, force - taken
-        for touch in model.mesh.touches if pressed else ():
-            if touch.member == member and touch.to is not None:
-                self._lay(touch, x, rotation, force, moment)
         return {"position": position, "rotation": rotation, "force": force, "moment": moment}, taken
 
     def _pushes(self, member: str) -> list[tuple[int, float, Array]]:
@@ -628,101 +603,15 @@ class Fields:
             factor = self.model.scene.histories[tendon.history].factor(factor)
         return float(self.balance.tendon(name)["length"] - rest + factor * pull)
 
-    def _lay(self, touch: Touch, x: Array, rotation: Array, force: Array, moment: Array) -> None:
-        """Force and moment along a stretch that lies on an obstacle, in place, dimensionless.
-
-        Its shape across the obstacle is known, so that the moment about the axis across is, and the derivative of
-        that is the force towards the obstacle.  The force along changes with what acts along, and on a circle with
-        the force across.
-        """
-        inside = (x >= touch.at) & (x <= float(touch.to or 0.0))
-        if not inside.any():
-            return
-        model, here = self.model, x[inside]
-        tangents = self._tangents(touch.member, here, rotation[inside])
-        pressed, axes = self.pressed_moments(touch, here)
-        across = np.cross(axes, tangents)
-        step = 1e-5
-        low, high = np.clip(here - step, touch.at, None), np.clip(here + step, None, touch.to)
-        (before, first), (after, last) = self.pressed_moments(touch, low), self.pressed_moments(touch, high)
-        length = model.scales.length / model.scene.center_lines[touch.member].length
-        spans = np.maximum(high - low, 1e-300)
-        moment[inside] += (pressed - np.einsum("ni,ni->n", moment[inside], axes))[:, None] * axes
-        # m' = -t x n, and the axis turns with the member on the obstacle.
-        turning = np.einsum("ni,ni->n", moment[inside], (last - first) / spans[:, None])
-        shear = (
-            -((after - before) / spans - turning) * length / (1.0 + self._stretched(touch.member, here, force[inside]))
-        )
-        if self._curvature(touch):
-            along = self._along_round(touch, here, pressed)
-            force[inside] = along[:, None] * tangents + shear[:, None] * across
-        else:
-            force[inside] += (shear - np.einsum("ni,ni->n", force[inside], across))[:, None] * across
-
-    def _stretched(self, member: str, x: Array, force: Array) -> Array | float:
-        """Strain (n,) along a member that does not shear, by the section force (n, 3), dimensionless."""
-        scene = self.model.scene
-        record = scene.members[member]
-        if not record.stretches(scene.sections):
-            return 0.0
-        compliance = scene.sections[str(record.section)].compliance(x)[:, 0] * self.model.scales.force
-        return np.asarray(compliance * np.einsum("ni,ni->n", force, self.tangents(member, x)))
-
-    def _along_round(self, touch: Touch, x: Array, pressed: Array) -> Array:
-        """Force along a stretch on a circle: that before it, what acts along it, and what bends round."""
-        model = self.model
-        part = model.elements_of(touch.member)
-        first = model.mesh.cut_at(touch.member, touch.at)
-        spread, turned = self._loading.spread[part], self.turned[part]
-        pushed = np.einsum("eka,eka->ek", spread, turned) / np.linalg.norm(turned, axis=2)
-        sums = np.concatenate([[0.0], np.cumsum(pushed.sum(axis=1))])
-        gained = _summed(self._stations(touch.member, x), sums[:, None], pushed[..., None])[:, 0] - sums[first]
-        if first == 0:
-            begin = float(_three(self._start_forces(part)[0]) @ self._tangent_at(touch.member, 0.0))
-        else:
-            start = self.along(touch.member, np.array([np.nextafter(touch.at, 0.0)]), dimensionless=True)
-            begin = float(start["force"][0] @ self._tangent_at(touch.member, touch.at))
-        bent = self._curvature(touch) * (pressed - self.pressed_moments(touch, np.array([touch.at]))[0][0])
-        return np.asarray(begin - bent * model.scales.length - gained)
-
     @property
     def twisted(self) -> Array:
         """Angles (places,), rad, by which tubes are twisted, at their places."""
         return self._nodal[:, 0]
 
     @property
-    def largest_load(self) -> float:
-        """Largest component of the forces on places and the moments on rotations, dimensionless."""
-        return max(float(np.abs(part).max(initial=0.0)) for part in (self._loading.force, self._loading.moment))
-
-    @property
     def total_load(self) -> Array:
         """Resultant of all forces that are loads, (3,) N."""
         return _three(self._loading.force.sum(axis=0)) * self.model.scales.force
-
-    def moment_on(self, turn: int) -> float:
-        """Magnitude of the external moment on a rotation, given by its number; dimensionless."""
-        return float(np.linalg.norm(self._loading.moment[turn]))
-
-    def own_force(self, node: str) -> Array:
-        """Force (3,) N that acts as a load on a node itself, not on its members."""
-        return _three(self._loading.own[self.model.segments.place(node)]) * self.model.scales.force
-
-    def own_moment(self, node: str) -> Array:
-        """Moment (3,) about the fixed axes that acts as a load on a node itself, dimensionless."""
-        return np.asarray(self._loading.couple[self.model.segments.place(node)])
-
-    def load_before(self, member: str, x: Array) -> Array:
-        """Resultant (n, 3) of the loads along a member from its start to fractions x (n,) of it, dimensionless."""
-        model, element = self.model, self.model.element
-        part, cuts = model.elements_of(member), model.mesh.cuts[member]
-        spread, starts = self._loading.spread[part], self._start_forces(part)
-        # What the force loses from element to element is a load there, but where an obstacle has a place.
-        lost = starts[:-1] - spread[:-1].sum(axis=1) - starts[1:]
-        lost[np.isin(cuts[1:-1], [at for t in model.mesh.touches if t.member == member for at in t.places])] = 0.0
-        points = np.where(x[:, None] >= cuts[None, 1:-1], 1.0, 0.0) @ lost
-        sums = np.concatenate([np.zeros((1, element.axes)), np.cumsum(spread.sum(axis=1), axis=0)])
-        return _three(points + _summed(self._stations(member, x), sums, spread))
 
     def stiffness(self, member: str, x: float) -> float:
         """Smallest bending stiffness of a member's section at a fraction of its length, dimensionless."""
@@ -733,10 +622,6 @@ class Fields:
         """Derivative (n, 3) of the unit tangent by the arc length, 1/m, fixed axes, from :meth:`along`."""
         frames = self._frames(member, x, found["rotation"])
         return np.cross(np.einsum("nij,nj->ni", frames, found["curvature"]), frames[:, :, 0])
-
-    def _tangent_at(self, member: str, x: float) -> Array:
-        place = np.array([x])
-        return np.asarray(self._tangents(member, place, rotations_along(self.model, self.state.q, member, place))[0])
 
     def _tangents(self, member: str, x: Array, rotation: Array) -> Array:
         """Tangents (n, 3) at fractions of the length."""
@@ -828,42 +713,6 @@ class Fields:
 
     def _stations(self, member: str, x: Array) -> Stations:
         return Stations(self.model.element, self.model.mesh.cuts[member], x)
-
-    def _curvature(self, touch: Touch) -> float:
-        """Signed curvature that an obstacle gives to a stretch, 1/m."""
-        contact = self.model.scene.contacts[touch.contact]
-        if contact.radius is None:
-            return 0.0
-        return touch.way / (contact.radius - (-1.0 if contact.side == "inside" else 1.0) * touch.offset)
-
-    def pressed_moments(self, touch: Touch, x: Array) -> tuple[Array, Array]:
-        """Moments (n,) that bend a member to the shape of an obstacle, dimensionless, and their axes (n, 3)."""
-        if self.model.space:
-            return self._pressed_in_space(touch, x)
-        scene = self.model.scene
-        line = scene.center_lines[touch.member]
-        stiffness = scene.sections[str(scene.members[touch.member].section)].stiffness(x)
-        column = 1 if line.bending_axis == 2 else 2
-        sign = np.rint(quaternion.matrix(line.quaternions(x))[:, 2, column])
-        bent = self._curvature(touch) - sign * (line.curvatures(x) + self.natural(touch.member, x))[:, column]
-        axes = np.broadcast_to([0.0, 0.0, 1.0], (len(x), 3))
-        return np.asarray(stiffness[:, column] * bent / self.model.scales.moment), axes
-
-    def _pressed_in_space(self, touch: Touch, x: Array) -> tuple[Array, Array]:
-        """The same on a plane in space: what bends about the axis in the plane across the member."""
-        model = self.model
-        normal = np.asarray(model.scene.contacts[touch.contact].normal, dtype=float)
-        # At the border of the stretch its own element says how it is bent.
-        middle = np.clip(x, np.nextafter(touch.at, 1.0), np.nextafter(float(touch.to or 1.0), 0.0))
-        rotation = rotations_along(model, self.state.q, touch.member, middle)
-        record = model.scene.members[touch.member]
-        strain = self._changes(touch.member, middle) - self.natural(touch.member, middle)
-        stiffness = model.scene.sections[str(record.section)].stiffness_matrix(middle)
-        frames = self._frames(touch.member, middle, rotation)
-        moments = np.einsum("nij,njk,nk->ni", frames, stiffness, strain) / model.scales.moment
-        axes = np.cross(normal / np.linalg.norm(normal), frames[:, :, 0])
-        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-        return np.einsum("ni,ni->n", moments, axes), axes
 
     def _changes(self, member: str, x: Array) -> Array:
         """Changes (n, 3) of twist and of the curvatures about b2 and b3, 1/m, as elements say at fractions x."""
@@ -1027,14 +876,6 @@ class Fields:
         forces = np.array([force for force, _ in self.balance.body_ends(member)]) * model.scales.force
         return float(np.abs(forces @ chord).max() / np.linalg.norm(chord)) / firm
 
-    def _start_forces(self, part: slice) -> Array:
-        """Internal force at the start of each of consecutive elements, (elements, axes)."""
-        element = self.model.element
-        spread = self._spread[part]
-        # The pull at the first point is minus the force there; the spread load is distributed as in its adjoint.
-        beyond = np.einsum("j,eja->ea", element.to_points[:, 0], spread) / element.weights[0]
-        return -self._pull[part][:, 0] - beyond + spread.sum(axis=1)
-
     def _gained(self, part: slice, pull: Array) -> Array:
         """What the moment gains at the points of elements (elements, points, 3): by forces, less couples along them."""
         torque, gained = self._loading.torque[part], _cross(self.turned[part], pull)
@@ -1071,9 +912,8 @@ class Fields:
             gains -= self._loading.moment[chain[:, 1:-1]].sum(axis=1)
         moments = -self.balance.start_moment(member) + np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
         strings = self._strings[part]
-        if strings.any() or any(touch.to is not None for touch in model.mesh.touches):
-            # An obstacle along a stretch and a string give couples that no loading knows: the elements say what reaches
-            # them.
+        if strings.any():
+            # A string gives couples that no loading knows: the elements say what reaches them.
             moments[:-1] = -self.balance.starting_moments(part) - _cross(self.turned[part, 0], strings)
         return np.asarray(moments)
 

@@ -29,54 +29,12 @@ __all__ = [
     "Mesh",
     "Remembered",
     "Spot",
-    "Touch",
     "Vector",
     "breaks_of",
     "cut",
     "first_mesh",
     "uniform_mesh",
 ]
-
-
-@dataclass(frozen=True)
-class Touch:
-    """A contact between a member and an obstacle: at one place, or along a stretch.
-
-    Attributes
-    ----------
-    contact, member : str
-    at, to : float, float or None
-        Fractions of the length, ``to`` only for a stretch; elements end there.
-    number : int
-        Distinguishes contacts of the same member and obstacle.
-    offset : float
-        Distance by which the obstacle is moved back, for a homotopy to its place, m.
-    way : float
-        1 or -1: on which side of the member an edge is (1: the member's normal is the edge times the tangent), or
-        to which side a circle bends the member.
-    flat : bool
-        The section at a single place keeps lying on the obstacle: the end of a stretch without pressure, for the
-        test of stability.
-    """
-
-    contact: str
-    member: str
-    at: float
-    to: float | None = None
-    number: int = 0
-    offset: float = 0.0
-    way: float = 1.0
-    flat: bool = False
-
-    @property
-    def name(self) -> str:
-        """Name of its constraint rows, and of its place where that is no end of the member."""
-        return f"{self.contact} on {self.member}" + (f" ({self.number + 1})" if self.number else "")
-
-    @property
-    def places(self) -> tuple[float, ...]:
-        """The fractions of the length: one for a place, two for a stretch."""
-        return (self.at,) if self.to is None else (self.at, self.to)
 
 
 Vector = tuple[float, float, float]
@@ -356,8 +314,6 @@ class Mesh:
         Gauss integration instead of integration at the nodes.
     rigid : frozenset of str
         Members whose elements are never halved.
-    touches : tuple of Touch
-        Contacts with obstacles; elements end there.
     stops : tuple of (str, str)
         Springs that are held at a stop: name, and ``low`` or ``high``; tendons that are slack: name, and ``slack``.
     points : tuple of ContactPoint
@@ -377,7 +333,6 @@ class Mesh:
     cuts: Mapping[str, Array]
     gauss: bool = False
     rigid: frozenset[str] = frozenset()
-    touches: tuple[Touch, ...] = ()
     stops: tuple[tuple[str, str], ...] = ()
     points: tuple[ContactPoint, ...] = ()
     places: bool = False

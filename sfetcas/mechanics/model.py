@@ -25,7 +25,7 @@ from ..mathematics.arrays import Array, Index
 from .actuation import actuations_in
 from .beams import ELEMENT_DATA, Beams, Scales, beams_of, scales_of
 from .clearances import clearances_in
-from .connections import connections_in, touches_in
+from .connections import connections_in, stopped_in
 from .contact_points import contact_points_in
 from .elements import Element, element_by_name
 from .laws import laws_in
@@ -54,7 +54,7 @@ __all__ = ["SOURCES", "Block", "Model", "assemble"]
 
 SOURCES: list[Callable[[Parts], Iterable[One]]] = [
     connections_in,
-    touches_in,
+    stopped_in,
     laws_in,
     stretch_laws_in,
     relaxations_in,
@@ -244,7 +244,7 @@ class Model:
         """
         scene = self.scene
         refuse_memory(scene, KNOWS_NO_STEPS)
-        if scene.contacts and not (self.mesh.touches or self.mesh.points):
+        if scene.contacts and not self.mesh.points:
             message = "a model by itself knows no contact, accepted: the scene without contacts, or solve(scene)"
             raise SceneError(message, ("contacts",))
         stopped = [name for name, spring in scene.springs.items() if spring.stop is not None]

@@ -143,11 +143,6 @@ class Segments:
         return {name: i for i, name in enumerate(self.places)}
 
 
-def _touched(mesh: Mesh, member: str) -> dict[int, str]:
-    """Cuts of a member where obstacles push it, with the names of these places; its ends among them."""
-    return {mesh.cut_at(member, touch.at): touch.name for touch in mesh.touches if touch.member == member}
-
-
 def standing(mesh: Mesh, point: ContactPoint, side: int) -> int | None:
     """Number of the end of elements at which a point of contact stays on a member; None where it is within one."""
     at, cuts = point.at[side], mesh.cuts[point.members[side]]
@@ -355,16 +350,15 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
         if name not in mesh.cuts:
             continue
         cuts = mesh.cuts[name]
-        touched, last = _touched(mesh, name), len(cuts) - 1
-        retained |= {ends[name, i] for i, cut in enumerate((0, last)) if cut in touched}
+        last = len(cuts) - 1
         every = name in stopped or (mesh.places and member.type == "flexible")
         inner = range(1, last) if every else _retained_cuts(scene, mesh, name)
         points = [(p, i) for p in mesh.points for i, m in enumerate(p.members) if m == name]
         pointed = {cut for p, i in points for cut in cuts_of_point(mesh, p, i)}
-        stops = [0, *sorted({*inner, *touched, *pointed} - {0, last}), last]
+        stops = [0, *sorted({*inner, *pointed} - {0, last}), last]
         here = ends[name, 0]
         for a, b in zip(stops, stops[1:], strict=False):
-            there = ends[name, 1] if b == len(cuts) - 1 else touched.get(b, place_within(name, cuts[b]))
+            there = ends[name, 1] if b == len(cuts) - 1 else place_within(name, cuts[b])
             if b < len(cuts) - 1:
                 places.append(there)
                 retained.add(there)

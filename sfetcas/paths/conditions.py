@@ -167,6 +167,10 @@ class Conditions(ABC, Generic[One]):
         """Numbers of what is watched that say where what touches at places begins to lie along something."""
         return ()
 
+    def may_be_flat(self, fields: Fields) -> bool:
+        """Whether :meth:`flat` may be another one where elements end at places."""
+        return False
+
     def lying(self, mesh: Mesh, span: tuple[float, float], piece: Piece) -> Lying | None:
         """What follows a path where members lie along obstacles, on a mesh; None where none can.
 

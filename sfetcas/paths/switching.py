@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
@@ -56,9 +55,6 @@ FITS, FLAT_FITS = 3, 8
 """Times that elements are made to end where something acts: each leaves a thirtieth of how far that is off, or less;
 where a gap ceases to be curved more of it, as the place then goes far under small changes.
 """
-
-BENT = 0.5
-"""Share of the largest curvature of a gap along a path below which it is looked at more closely."""
 
 BESIDE = (1e-3, 1e-2, 5e-2, 0.2)
 """Arc lengths before and behind an event between which it is located on a mesh that is made for it."""
@@ -237,7 +233,6 @@ class Choices:
         self.unit, self.conditions = max(map(abs, span)), conditions
         self._base, self._finer = mesh if base is None else base, finer
         self.lying = conditions.lying(self.mesh, span, self._piece)
-        self._margins = weakref.WeakKeyDictionary[Standing, Array]()
 
     def prepared(self, choice: Choice = NOTHING) -> Prepared:
         """The model of a choice, ready to be solved."""
@@ -344,6 +339,7 @@ class Choices:
     @property
     def _lying(self) -> Lying:
         """What follows a path where members lie along obstacles."""
+        assert self.lying is not None
         self.lying.unit = self.unit
         return self.lying
 
@@ -411,25 +407,20 @@ class Choices:
 
     def _watched(self, standing: Standing) -> Array:
         """Margins (conditions,) of a point."""
-        if standing not in self._margins:
-            self._margins[standing] = self.conditions.watched(standing.fields)
-        return self._margins[standing]
+        return self.conditions.watched(standing.fields)
 
     def _until_flat(self, traced: Traced) -> Traced:
         """A stretch up to the first point from which on members lie along something.
 
         That is seen where elements end at places: elsewhere curvatures are those of both sides of a force mixed.
         """
-        flats = list(self.conditions.flats(traced.points[0].fields))
-        if not flats:
-            return traced
-        margins = np.array([self._watched(point)[flats].min() for point in traced.points])
-        for i in (np.flatnonzero(margins[1:] < BENT * margins.max()) + 1).tolist():
-            fitted = self.again(traced.points[i])
+        flats = self.conditions.flats(traced.points[0].fields)
+        for i, point in enumerate(traced.points[1:] if flats else (), start=1):
+            fitted = self.again(point) if self.conditions.may_be_flat(point.fields) else None
             if fitted is not None and self.conditions.flat(fitted.fields):
-                known = {id(point) for point in traced.points[:i]}
+                known = {id(one) for one in traced.points[:i]}
                 events = [event for event in traced.events if id(event.standing) in known]
-                return replace(traced, points=traced.points[: i + 1], events=events, end="margin", crossed=tuple(flats))
+                return replace(traced, points=traced.points[: i + 1], events=events, end="margin", crossed=flats)
         return traced
 
     def crossings(self, followed: Followed, factors: tuple[float, ...]) -> list[Standing]:
@@ -504,7 +495,7 @@ class Choices:
     def located(self, followed: Followed) -> Followed:
         """A path whose events and transitions are located where elements end where something acts then."""
         parts, transitions = list[Part](), list[Transition]()
-        following = [*followed.parts[1:], None]
+        following = [*followed.parts[1:], followed.parts[-1]]
         for part, after, change in itertools.zip_longest(followed.parts, following, followed.transitions):
             found, events = dict[int, Standing](), list[Event]()
             for event in part.traced.events:

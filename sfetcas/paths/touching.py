@@ -492,6 +492,19 @@ class Touching(Conditions[_At]):
         """As of :class:`.Conditions`."""
         return tuple(i for i, (one, _) in enumerate(self._margins(fields)) if isinstance(one, _Flat))
 
+    def may_be_flat(self, fields: Fields) -> bool:
+        """As of :class:`.Conditions`: the curvature is told to what a force within an element changes it by."""
+        model, found = fields.model, False
+        for begun, point in zip(model.mesh.points, points_in(fields), strict=True):
+            if len(point.members) > 1 or point.edge or not (point.slides[0] and self.run.lines.bends(point.members[0])):
+                continue
+            (member,), at, cuts = point.members, point.at[0], model.mesh.cuts[point.members[0]]
+            element = int(np.clip(np.searchsorted(cuts, at) - 1, 0, len(cuts) - 2))
+            length = (cuts[element + 1] - cuts[element]) * self.closest.lengths[member] / model.scales.length
+            bends = fields.contact_point(begun)["push"] / model.scales.force * length / fields.stiffness(member, at)
+            found |= bool(self._bend(fields, point) <= bends + STRAIGHT)
+        return found
+
     def lying(self, mesh: Mesh, span: tuple[float, float], piece: Piece) -> Lying:
         """As of :class:`.Conditions`."""
         return Lying(self.run, mesh, span, piece, self.accuracy)

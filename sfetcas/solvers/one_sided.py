@@ -102,10 +102,10 @@ class OneSided(AtLoads):
         if here.residual <= AGAIN:
             chosen = self.acting.tobytes()
             self._tried[chosen] = self._tried.get(chosen, 0) + 1
-        chosen = np.append(1.0, found)
-        step = moved @ chosen
+        shares = np.append(1.0, found)
+        step = moved @ shares
         step[rows[~self.acting]] = -forces[~self.acting]
-        return self._with_factor(step, factor @ chosen)
+        return self._with_factor(step, factor @ shares)
 
     def _with_factor(self, step: Array, factor: float) -> Array:
         step = self._without_flat(step)
