@@ -171,7 +171,7 @@ class Conditions(ABC, Generic[One]):
         """Whether :meth:`flat` may be another one where elements end at places."""
         return False
 
-    def lying(self, mesh: Mesh, span: tuple[float, float], piece: Piece) -> Lying | None:
+    def lying(self, mesh: Mesh, span: tuple[float, float], piece: Piece, finer: float) -> Lying | None:
         """What follows a path where members lie along obstacles, on a mesh; None where none can.
 
         Parameters
@@ -179,7 +179,7 @@ class Conditions(ABC, Generic[One]):
         mesh : Mesh
         span : (low, high)
             Range of factors.
-        piece : callable
+        piece, finer
             As of :class:`~sfetcas.paths.lying.Lying`.
         """
         return None

@@ -78,6 +78,8 @@ class Lying:
         As of :data:`Piece`.
     accuracy : float
         Wanted error of the positions over the size of the scene.
+    finer : float
+        As of :class:`~sfetcas.contact.lines.Lines`.
 
     Attributes
     ----------
@@ -92,9 +94,10 @@ class Lying:
         span: tuple[float, float],
         piece: Piece,
         accuracy: float,
+        finer: float = 1.0,
     ) -> None:
         self.run, self.mesh, self.span, self.piece = run, mesh, span, piece
-        self.accuracy, self.unit = accuracy, 1.0
+        self.accuracy, self.finer, self.unit = accuracy, finer, 1.0
 
     # -- one point ------------------------------------------------------------------------------
 
@@ -153,19 +156,23 @@ class Lying:
 
         points = points_of(source)
         run.lines.keys = frozenset(one.pair for one in (*begins, *points) if one in begins or lies_along([one]))
+        run.lines.finer = self.finer
         run.edges.begin(now.fields)
-        found = run.resolved(*self._laid(source, points, begins), source, way)
+        found = run.resolved(*self._laid(source, now, begins), source, way)
         found = None if found is None else run.with_ends(found, way, (self.accuracy, felt * self.accuracy))
         if found is None or run.turned(now.fields, found.fields) > STRIDE or run.passed(now.fields, found.fields):
             return None
         return found
 
-    def _laid(self, source: Solved, points: Points, begins: Sequence[ContactPoint]) -> tuple[Mesh, Points]:
-        """The elements, with those that lines need, and the places along these and elsewhere."""
-        run, mesh, lines = self.run, self.mesh, self.run.lines
+    def _laid(self, source: Solved, now: Solved, begins: Sequence[ContactPoint]) -> tuple[Mesh, Points]:
+        """The elements, with those that lines need, and the places along these and elsewhere.
+
+        Lines are those of the point ``now``, where they end is told by the state ``source`` that is expected.
+        """
+        run, mesh, lines, points = self.run, self.mesh, self.run.lines, points_of(source)
         parts: dict[PairKey, list[tuple[float, float]]] = {
             key: [self._expected(source, key, part[0], part[-1]) for part in stretches]
-            for key, stretches in lines.stretches(source).items()
+            for key, stretches in lines.stretches(now).items()
         }
         for one in begins:
             at = min(max(one.at[0], 0.0), 1.0)
@@ -216,7 +223,9 @@ class Lying:
         while length >= SHORTEST:
             now, stride = points[-1], (self.span[1] - self.span[0]) / SHARE
             length = min(length, longest(self.curve(now), now, stride))
-            there, end = self._next(now, length, flat(now))
+            known = points_of(now) if lies_along(points_of(now)) else ()
+            begins = [one for one in flat(now) if one.pair not in {point.pair for point in known}]
+            there, end = self._next(now, length, begins)
             if there is None:
                 length *= 0.5
                 continue

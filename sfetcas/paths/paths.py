@@ -282,12 +282,12 @@ class PathTracing:
         gain, stalled = 1.0 if self.scene.remembers else max(1.0, 4.0**mesh.order / MARGIN), 0
         for count in range(LEVELS):
             coarse = self._with_fronts(coarse)
-            fine = self._level(self._halved(coarse.curve.model.mesh))
+            fine = self._level(self._halved(coarse.choices.mesh))
             errors = {key: error / gain for key, error in self._errors(coarse, fine).items()}
             largest = max(errors.values(), default=0.0)
             stalled = stalled + 1 if not largest <= 0.5 * last or not np.isfinite(largest) else 0
             hopeless = stalled and (count >= PATIENCE or stalled * fine.effort > AFFORDED)
-            if largest <= self.accuracy or hopeless or 2 * fine.curve.model.mesh.elements > MOST_ELEMENTS:
+            if largest <= self.accuracy or hopeless or 2 * fine.choices.mesh.elements > MOST_ELEMENTS:
                 break
             coarse, last = self._next(fine, gain * largest, gain), largest
         fine.notes += _disagreement(coarse, fine) if not np.isfinite(largest) else ()
@@ -295,7 +295,7 @@ class PathTracing:
 
     def _with_fronts(self, level: _Level) -> _Level:
         """The level on a mesh on which fronts leave little, if it is not that already."""
-        while self.scene.remembers and 2 * level.curve.model.mesh.elements <= MOST_ELEMENTS:
+        while self.scene.remembers and 2 * level.choices.mesh.elements <= MOST_ELEMENTS:
             points = [point for part in level.stretches for point in self._watched(level.curve, part)]
             mesh = refined_by_fronts(level.curve, points, self.accuracy, self.fixed)
             if mesh is None:
@@ -316,10 +316,10 @@ class PathTracing:
         """
         hoped = max(2.0, HOPED * gain)
         wanted = np.log(max(error / (self.accuracy * gain), 1.0)) / np.log(hoped) if np.isfinite(error) else 0.0
-        mesh = fine.curve.model.mesh
+        mesh = fine.choices.mesh
         for _ in range(min(int(np.ceil(wanted - 0.25)) - 1, 3)):
             mesh = self._halved(mesh) if 4 * mesh.elements <= MOST_ELEMENTS else mesh
-        return fine if mesh is fine.curve.model.mesh else self._level(mesh)
+        return fine if mesh is fine.choices.mesh else self._level(mesh)
 
     def _first_mesh(self) -> Mesh:
         """The mesh for the largest factor; where that needs many elements, for the largest that is met."""
@@ -340,8 +340,9 @@ class PathTracing:
         """The models of a mesh, with the ``unit`` of a path that is known already."""
         base = mesh if self.base is None else self.base
         sizes = [(len(cuts) - 1) / (len(base.cuts[name]) - 1) for name, cuts in mesh.cuts.items()]
-        finer = functools.partial(self._halved, times=int(np.log2(max(sizes, default=1.0))))
-        found = Choices(mesh, self._prepared, self.span, self.knots, self.conditions, base, finer)
+        times = int(np.log2(max(sizes, default=1.0)))
+        finer = functools.partial(self._halved, times=times)
+        found = Choices(mesh, self._prepared, self.span, self.knots, self.conditions, base, finer, times)
         found.unit = unit or found.unit
         return found
 
@@ -550,7 +551,7 @@ class PathTracing:
 
 def _disagreement(coarse: _Level, fine: _Level) -> tuple[str, ...]:
     """What two meshes do not agree on, a note."""
-    sizes = " and ".join(str(level.curve.model.mesh.elements) for level in (coarse, fine))
+    sizes = " and ".join(str(level.choices.mesh.elements) for level in (coarse, fine))
     counts = [len(level.stretches) - 1 for level in (coarse, fine)]
     found = [f"{counts[0]} and {counts[1]} branches"] if counts[0] != counts[1] else []
     for i, parts in enumerate(zip(coarse.stretches, fine.stretches, strict=False)):

@@ -216,6 +216,8 @@ class Choices:
         What is one-sided.
     base, finer
         A mesh, and what makes ``mesh`` of it: that is made anew where elements of the first end elsewhere.
+    halvings : int
+        How often elements have been halved for that.
     """
 
     def __init__(
@@ -227,12 +229,13 @@ class Choices:
         conditions: Conditions[Any],
         base: Mesh | None = None,
         finer: Callable[[Mesh], Mesh] = lambda mesh: mesh,
+        halvings: int = 0,
     ) -> None:
         self.mesh, self.span, self.knots = replace(mesh, stops=(), points=()), span, knots
         self._prepare, self._known = prepare, dict[Choice, Prepared]()
         self.unit, self.conditions = max(map(abs, span)), conditions
         self._base, self._finer = mesh if base is None else base, finer
-        self.lying = conditions.lying(self.mesh, span, self._piece)
+        self.lying = conditions.lying(self.mesh, span, self._piece, 0.5**halvings)
 
     def prepared(self, choice: Choice = NOTHING) -> Prepared:
         """The model of a choice, ready to be solved."""

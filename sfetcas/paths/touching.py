@@ -505,9 +505,9 @@ class Touching(Conditions[_At]):
             found |= bool(self._bend(fields, point) <= bends + STRAIGHT)
         return found
 
-    def lying(self, mesh: Mesh, span: tuple[float, float], piece: Piece) -> Lying:
+    def lying(self, mesh: Mesh, span: tuple[float, float], piece: Piece, finer: float) -> Lying:
         """As of :class:`.Conditions`."""
-        return Lying(self.run, mesh, span, piece, self.accuracy)
+        return Lying(self.run, mesh, span, piece, self.accuracy, finer)
 
     def _new(self, one: _Touch) -> ContactPoint:
         """A place that begins to touch."""
