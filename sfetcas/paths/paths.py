@@ -9,8 +9,9 @@ bifurcations of a symmetric structure apart.
 from __future__ import annotations
 
 import functools
+import itertools
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -79,6 +80,9 @@ WATCHED = 30
 
 EVALUATIONS = 500.0
 """About as often the equations are evaluated along a path."""
+
+LYING = "where members lie along obstacles limit points are located; bifurcations are not looked for, and branches not followed"
+"""A note."""
 
 LEAST_WAY = 1e-3
 """A path that ends before this share of its range is none."""
@@ -387,7 +391,7 @@ class PathTracing:
         for number, (on, event) in enumerate(bends[: self.analysis.branches], start=1):
             for side in (1, -1):
                 self._add_branch(level, on, event, number, side)
-        level.notes += _beside(main.traced.near)
+        level.notes += (*_beside(main.traced.near), *_lying(level.stretches))
         level.stretches = [self.stretch(part, choices) for part in level.stretches]
         return level
 
@@ -563,6 +567,20 @@ def _disagreement(coarse: _Level, fine: _Level) -> tuple[str, ...]:
         a, b = (len(part.crossings) for part in parts)
         found += [f"{a} and {b} crossings of the factors asked for{where}"] if a != b else []
     return (f"meshes of {sizes} elements do not agree: they have {', '.join(found)}",) if found else ()
+
+
+def _lying(stretches: Sequence[_Stretch]) -> tuple[str, ...]:
+    """Notes on stretches along which members lie on obstacles."""
+    notes = list[str]()
+    for part in (part for stretch in stretches for part in stretch.traced.parts if part.lies):
+        limits = {id(event.standing) for event in part.traced.events}
+        for a, b in itertools.pairwise(part.traced.points):
+            ways = [point.inertia.negative for point in (a, b)]
+            if a.model.conservative and ways[0] != ways[1] and not limits & {id(a), id(b)}:
+                change = f"the number of unstable directions changes from {ways[0]} to {ways[1]}"
+                notes.append(f"between factors {a.factor:.6g} and {b.factor:.6g} {change}")
+        notes.insert(0, LYING)
+    return tuple(dict.fromkeys(notes))
 
 
 def _beside(near: tuple[float, ...]) -> tuple[str, ...]:
