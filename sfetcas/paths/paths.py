@@ -69,6 +69,9 @@ FEW_ELEMENTS = 16
 AFFORDED = 20_000
 """Points times unknowns of a mesh after which one that did not halve the error is the last; once it was about 3 s."""
 
+DEARER = 10
+"""Times more that a point takes along lines."""
+
 MOST_ELEMENTS = 3000
 """A mesh that the library chooses does not grow beyond this."""
 
@@ -81,7 +84,7 @@ WATCHED = 30
 EVALUATIONS = 500.0
 """About as often the equations are evaluated along a path."""
 
-LYING = "where members lie along obstacles limit points are located; bifurcations are not looked for, and branches not followed"
+LYING = "limit points are located along obstacles on which members lie; bifurcations there are not looked for"
 """A note."""
 
 LEAST_WAY = 1e-3
@@ -235,7 +238,9 @@ class _Level:
     @property
     def effort(self) -> int:
         """Points times unknowns, to which the time that it took is about proportional."""
-        return sum(len(part.traced.points) for part in self.stretches) * self.curve.equations.unknowns
+        parts = [part for stretch in self.stretches for part in stretch.traced.parts]
+        points = sum(len(part.points) * (DEARER if part.lies else 1) for part in parts)
+        return points * self.curve.equations.unknowns
 
 
 def _states(level: _Level) -> Iterator[tuple[str, Fields]]:

@@ -62,6 +62,9 @@ BESIDE = (1e-3, 1e-2, 5e-2, 0.2)
 S = TypeVar("S", Event, Standing)
 """What is located."""
 
+BRIEF = 4
+"""Points between the end of a line and the begin of another one, up to which the path goes to and fro between these."""
+
 BACK = 6
 """Points back from the first one without lines within which they end: steps along lines are no longer."""
 
@@ -359,6 +362,10 @@ class Choices:
 
         None where the path ends.
         """
+        if len(found.parts) > 1 and found.parts[-2].lies and len(found.parts[-1].traced.points) <= BRIEF:
+            names = enumerated(sorted({f"contacts.{point.contact}" for point in flat}))
+            found.ending = f"members lie along {names} without pressing, so that nothing tells which places touch"
+            return None
         if any(any(point.slides) for point in flat):
             # Where elements do not end at a place the curvature is not known there.
             crossed = self.conditions.flats(at.fields)
