@@ -332,6 +332,20 @@ def test_a_thin_arch_on_a_thicker_peg_is_the_same(arch):
     )
 
 
+def test_a_line_begins_and_grows_on_a_floor():
+    """With the factor as an unknown the states of load steps, at which it is given."""
+    floor = {"type": "plane", "point": [0, -0.1], "normal": [0, 1], "member_radius": 0.05}
+    found = cantilever(floor, loads={"w": {"type": "distributed", "member": "a", "value": [0, -1]}})
+    path = path_of(found, [0, 8], steps=[6.0, 8.0], accuracy=1e-4)
+    assert told(path) == ["contacts.c touches a at 1", "a begins to lie along contacts.c"]
+    for step in path.steps:
+        alone = at(found, step.factor)
+        # The accuracy asked for.
+        np.testing.assert_allclose(step.position("B"), alone.position("B"), atol=1e-4)
+        assert step.contacts["c"]["at"][0] == pytest.approx(alone.contacts["c"]["at"][0], abs=1e-3)
+        assert step.certificate.stable is True
+
+
 def test_a_column_between_walls():
     """Buckled against a wall, it begins to lie along it at four times Euler's load (Domokos, Holmes, Royce 1997)."""
     path = solve(load("problems/column_between_walls.toml"))
