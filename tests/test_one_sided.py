@@ -6,6 +6,11 @@ from test_points_on_obstacles import FLOOR, LARGER, cantilever, smaller
 
 from sfetcas import solve
 from sfetcas.mathematics.complementarity import by_pivots
+from sfetcas.solvers.arclength import Curve, Tangent, bordered
+from sfetcas.solvers.between_states import turned_between
+from sfetcas.solvers.newton import correct
+from sfetcas.solvers.one_sided import OneSided
+from sfetcas.solvers.prepared import Prepared
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -103,3 +108,29 @@ def test_line_that_grows_and_shrinks_has_the_force_of_its_length():
     np.testing.assert_allclose(held, [4.0 * step.factor for step in steps], rtol=1e-9)
     # What has been lifted lies down where it lay: without friction the way does not matter.
     np.testing.assert_allclose(ups[0], ups[2], rtol=1e-6)
+
+
+def test_with_an_unknown_factor_the_solution_is_across_a_direction():
+    """An equilibrium, but for the choice of what pushes, and no nearer to the expected one along the direction."""
+    loads = {"w": {"type": "distributed", "member": "beam", "value": [0, -40.0]}}
+    step = solve(cantilever(smaller({**FLOOR, "point": [0, -0.1]}), loads=loads)).last
+    prepared = Prepared(step.model)
+    equations, names = prepared.equations, list(step.model.row_names)
+    equations.redundant = False
+    curve = Curve(prepared, 1.0)
+    now = curve.standing(step.fields.state, 1.0, Tangent(np.zeros(equations.total), 1.0))
+    state, factor = curve.predicted(now, 0.01)
+    rows = [names.index(point.rows(2)[-1]) for point in step.model.mesh.points if not any(point.slides)]
+    acting, border = np.ones(len(rows), bool), bordered(curve, now.tangent)
+    # Rotations alone, to be added up again.
+    border.row[equations.rotation_unknowns :] = 0.0
+    loading = curve.loading(factor)
+    system = OneSided(equations, loading, prepared.weight, None, None, None, np.array(rows), acting, border)
+    found = correct(system, state, factor=factor)
+    assert found.converged
+    turned = turned_between(equations, found.state, state)
+    across = border.row[: len(turned)] @ turned + border.share * (found.loading.factor - factor)
+    # Rounding; the factor has changed by some 6e-7.
+    assert across == pytest.approx(0.0, abs=1e-12)
+    assert abs(found.loading.factor - factor) > 1e-7
+    assert found.residual < 1e-9

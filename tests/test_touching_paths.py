@@ -342,7 +342,8 @@ def test_a_line_begins_and_grows_on_a_floor():
         alone = at(found, step.factor)
         # The accuracy asked for.
         np.testing.assert_allclose(step.position("B"), alone.position("B"), atol=1e-4)
-        assert step.contacts["c"]["at"][0] == pytest.approx(alone.contacts["c"]["at"][0], abs=1e-3)
+        # What the end of a line is off turns nothing to first order.
+        assert step.contacts["c"]["at"][0] == pytest.approx(alone.contacts["c"]["at"][0], abs=1e-4)
         assert step.certificate.stable is True
 
 
