@@ -40,7 +40,7 @@ from .edges import Edges
 from .gripping import FIRM, Gripping, Placed
 from .lines import LINE, SHORT_LINE, Lines, Points, begun, points_of
 
-__all__ = ["MemberContact"]
+__all__ = ["FITS", "MemberContact"]
 
 Way = Callable[[Model], Loading]
 """The loading of a model."""
@@ -73,6 +73,9 @@ TOUCHED = 4e-5
 
 SUDDEN = 3.0
 """How many times faster than in the step before what is followed may turn, where it turns by a little at all."""
+
+FITS = 3
+"""Times that elements are made to end where points slide: each time what that moves these by falls to its square."""
 
 PATIENT = 2.0**-6
 """Step down to which the ends of lines are followed; in shorter ones they are sought anew."""
@@ -165,7 +168,7 @@ class MemberContact:
     def __init__(
         self, scene: Scene, prepare: Callable[[Mesh], Prepared], accuracy: float, fixed: Collection[str]
     ) -> None:
-        self.scene, self.prepare, self.fixed = scene, prepare, fixed
+        self.scene, self.prepare, self.accuracy, self.fixed = scene, prepare, accuracy, fixed
         self.closest = Closest(scene, 0.1 * accuracy)
         radii = min((pair.distance for pair in self.closest.pairs.values() if pair.stop is None), default=np.inf)
         self.tolerance = min(max(0.1 * accuracy, tolerances.CLOSED) * scene.size, ALLOWED * radii)
@@ -796,6 +799,22 @@ class MemberContact:
             if finer is None or self.turned(found.fields, finer.fields) > STRIDE:
                 return None
             found = finer
+        return found
+
+    def fitted(self, found: Solved, way: Way, times: int = FITS, *, prescribed: bool = False) -> Solved:
+        """The state with elements that end where points slide, made to do so some times; as far as that is found.
+
+        ``prescribed`` as of :meth:`.Lines.fitted`.
+        """
+        for _ in range(times):
+            before = found.model.mesh
+            mesh, points = self.lines.fitted(before, points_of(found), prescribed=prescribed)
+            if max(self.lines.moved(before, mesh).values(), default=0.0) < self.accuracy:
+                break
+            there = self.resolved(mesh, points, found, way)
+            if there is None or self.turned(found.fields, there.fields) > STRIDE:
+                break
+            found = there
         return found
 
     def as_lines(self, found: Solved, way: Way, turned: float) -> Solved | None:

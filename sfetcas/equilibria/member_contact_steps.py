@@ -12,8 +12,7 @@ import numpy as np
 
 from .. import tolerances
 from ..contact.held_inside import refuse_held_inside
-from ..contact.lines import points_of
-from ..contact.member_contact import MemberContact
+from ..contact.member_contact import FITS, MemberContact
 from ..description.inserting import stops_between
 from ..description.scene import Scene
 from ..description.supports import along
@@ -46,9 +45,6 @@ SHARES = (1.0, 1e-2, 1e-4)
 """Shares of small loads: what is straight between ends that come nearer moves aside by the root of them, and shall not
 yet touch.
 """
-
-FITS = 3
-"""Times that elements are made to end where points slide: each time what that moves these by falls to its square."""
 
 POINTED = 0.1
 """Rotation, over the accuracy, up to which a short line is taken for a point."""
@@ -213,18 +209,7 @@ class MemberContactSteps:
 
     def _fitted(self, now: Solved, factor: float, times: int = 1) -> Solved:
         """The state with elements that end where points slide; as far as that is found."""
-        run, way = self.run, lambda model: model.loading(factor)
-        for _ in range(times):
-            points, before = points_of(now), now.model.mesh
-            mesh, points = run.lines.fitted(before, points, prescribed=self.meshes.prescribed)
-            far = max(run.lines.moved(before, mesh).values(), default=0.0)
-            if far < self.meshes.accuracy:
-                break
-            there = run.resolved(mesh, points, now, way)
-            if there is None or run.turned(now.fields, there.fields) > NEAR:
-                break
-            now = there
-        return now
+        return self.run.fitted(now, lambda model: model.loading(factor), times, prescribed=self.meshes.prescribed)
 
     def _onto(self, mesh: Mesh, found: Solved, factor: float) -> Solved:
         """The same state on another mesh.

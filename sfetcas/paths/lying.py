@@ -18,7 +18,7 @@ import numpy as np
 
 from ..contact.closest import PairKey
 from ..contact.lines import Points, lies_along, points_of
-from ..contact.member_contact import MemberContact
+from ..contact.member_contact import FITS, MemberContact
 from ..mathematics.arrays import TINY
 from ..mechanics.fields import transferred
 from ..mechanics.loading import Loading
@@ -34,11 +34,6 @@ __all__ = ["Lying", "Piece"]
 
 Piece = Callable[[float, float], tuple[float, float]]
 """(factor, sign of its rate) -> range of factors without a knot of a history."""
-
-FELT, SHOWN = 1e-5, 0.1
-"""Rotation, over the accuracy, that the end of a line makes by being elsewhere, below which it stays: at points of an
-answer, and at those between them.
-"""
 
 ASIDE = 1e-6
 """Arc length over which a tangent is taken to another mesh, as a difference of states whose rounding is 1e-14."""
@@ -76,8 +71,6 @@ class Lying:
         Range of factors.
     piece : callable
         As of :data:`Piece`.
-    accuracy : float
-        Wanted error of the positions over the size of the scene.
     finer : float
         As of :class:`~sfetcas.contact.lines.Lines`.
 
@@ -93,11 +86,10 @@ class Lying:
         mesh: Mesh,
         span: tuple[float, float],
         piece: Piece,
-        accuracy: float,
         finer: float = 1.0,
     ) -> None:
         self.run, self.mesh, self.span, self.piece = run, mesh, span, piece
-        self.accuracy, self.finer, self.unit = accuracy, finer, 1.0
+        self.finer, self.unit = finer, 1.0
 
     # -- one point ------------------------------------------------------------------------------
 
@@ -106,12 +98,12 @@ class Lying:
         return Curve(at.prepared, self.unit, self.piece(at.factor, at.tangent.factor))
 
     def ahead(
-        self, now: Standing, length: float, begins: Sequence[ContactPoint] = (), felt: float = SHOWN
+        self, now: Standing, length: float, begins: Sequence[ContactPoint] = (), fits: int = 1
     ) -> Standing | None:
         """The point at a length ahead of another one, with lines that begin at some places; None if it is not found."""
         self.run.across = functools.partial(self.along, now)
         try:
-            found = self._found(self._predicted(now, length), now, begins, felt)
+            found = self._found(self._predicted(now, length), now, begins, fits)
         finally:
             self.run.across = None
         if found is None:
@@ -125,7 +117,7 @@ class Lying:
         length = (factor - near.factor) / rate if rate else 0.0
         length = float(np.clip(length, -STRIDE, STRIDE))
         source = replace(self._predicted(near, length), loading=self.curve(near).loading(factor))
-        found = self._found(source, near, (), FELT)
+        found = self._found(source, near, (), FITS)
         if found is None:
             return None
         curve, along = self.along(near, found.prepared)
@@ -147,7 +139,7 @@ class Lying:
         z[: len(turned)] = turned / ASIDE
         return curve, curve.normed(Tangent(z, now.tangent.factor))
 
-    def _found(self, source: Solved, now: Solved, begins: Sequence[ContactPoint], felt: float) -> Solved | None:
+    def _found(self, source: Solved, now: Solved, begins: Sequence[ContactPoint], fits: int) -> Solved | None:
         """What is near to a state that is expected after another one, under its loads or across a tangent."""
         run = self.run
 
@@ -159,7 +151,7 @@ class Lying:
         run.lines.finer = self.finer
         run.edges.begin(now.fields)
         found = run.resolved(*self._laid(source, now, begins), source, way)
-        found = None if found is None else run.with_ends(found, way, (self.accuracy, felt * self.accuracy))
+        found = None if found is None else run.fitted(found, way, fits)
         if found is None or run.turned(now.fields, found.fields) > STRIDE or run.passed(now.fields, found.fields):
             return None
         return found
@@ -182,7 +174,7 @@ class Lying:
             pair = run.closest.pairs[key]
             places = [x for part in stretches for x in part]
             sliding = tuple(ContactPoint(*key, (x,), (True,), pair.distance) for x in places)
-            mesh = lines.fitted(lines.divided(mesh, pair, places), sliding)
+            mesh, _ = lines.fitted(lines.divided(mesh, pair, places), sliding)
         for key, stretches in parts.items():
             near = run.closest.along(source.fields, run.closest.pairs[key], mesh, np.inf)
             laid = lines.laid(one for one in near if any(a <= one.at[0] <= b for a, b in stretches))
@@ -275,7 +267,7 @@ class Lying:
         known = {a.arc: a, b.arc: b}
 
         def rate(arc: float) -> float:
-            found = self.ahead(a, arc - a.arc, felt=FELT)
+            found = self.ahead(a, arc - a.arc, fits=FITS)
             known[arc] = found or b
             return np.nan if found is None else found.tangent.factor
 

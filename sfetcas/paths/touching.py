@@ -507,7 +507,7 @@ class Touching(Conditions[_At]):
 
     def lying(self, mesh: Mesh, span: tuple[float, float], piece: Piece, finer: float) -> Lying:
         """As of :class:`.Conditions`."""
-        return Lying(self.run, mesh, span, piece, self.accuracy, finer)
+        return Lying(self.run, mesh, span, piece, finer)
 
     def _new(self, one: _Touch) -> ContactPoint:
         """A place that begins to touch."""
