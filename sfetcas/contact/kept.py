@@ -21,8 +21,8 @@ from ..description.scene import Scene
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
 from ..mechanics.margins import UNDECIDED
-from ..mechanics.mesh import ContactPoint, Mesh
-from ..mechanics.segments import beside_line
+from ..mechanics.mesh import ContactPoint, Mesh, breaks_of
+from ..mechanics.segments import SAME_CUT, beside_line
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.redundancy import redundant
 from .closest import Near, Pair, PairKey
@@ -38,6 +38,9 @@ may be off: rounding leaves less.
 
 SLIVER = 1e-6
 """Fraction of a length below which an element is a sliver, which gains nothing and leaves rounding."""
+
+BESIDE = 0.1
+"""Share of the shorter element beside it up to which an end of elements is that of a line."""
 
 LASTING = 1e-10
 """Pull, dimensionless, that is rounding."""
@@ -99,7 +102,10 @@ class Kept:
         for name, cuts in self.rest.model.mesh.cuts.items():
             lines = [stretch for key, own in self.stretches.items() if key[1][0] == name for stretch in own]
             ends = np.unique([0.0, 1.0, *(x for stretch in lines for x in (stretch[0], stretch[-1]))])
-            others = cuts[np.abs(cuts[:, None] - ends).min(axis=1) >= SLIVER]
+            # Elements end where lines do up to the accuracy only: these ends are moved, not others made.
+            share = BESIDE * np.minimum(np.diff(cuts, prepend=-1.0), np.diff(cuts, append=2.0))
+            share[np.abs(cuts[:, None] - breaks_of(self.scene, name)).min(axis=1) < SAME_CUT] = 0.0
+            others = cuts[np.abs(cuts[:, None] - ends).min(axis=1) >= np.maximum(share, SLIVER)]
             others = others[np.diff(others, prepend=-1.0) >= SLIVER]
             found[name] = np.sort(np.concatenate([ends, others]))
         return found
