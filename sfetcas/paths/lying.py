@@ -70,7 +70,7 @@ class Lying:
     span : (low, high)
         Range of factors.
     piece : callable
-        As of :data:`Piece`.
+        Range of factors without a knot of a history around a factor, in the direction of its rate.
     finer : float
         As of :class:`~sfetcas.contact.lines.Lines`.
 
