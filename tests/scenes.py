@@ -393,3 +393,28 @@ def textbook(length, ea, gj, ei2, ei3):
         index = [place, turn, place + 6, turn + 6]
         k[np.ix_(index, index)] = s @ c @ s
     return k
+
+
+CARRIED = {
+    "nodes": {
+        "A": {"position": [0, 0], "support": "clamped"},
+        "B": {"position": [1, 0]},
+        "C": {"position": [0.6, -1], "support": "clamped"},
+        "D": {"position": [0.6, -0.4]},
+    },
+    "members": {"beam": {"nodes": ["A", "B"], "section": "s"}, "post": {"nodes": ["C", "D"], "section": "s"}},
+    "contacts": {"c": {"type": "circle", "center": [0.6, -0.3], "radius": 0.15, "member": "beam", "node": "D"}},
+}
+"""A beam over a circle that a post carries, without sections."""
+
+CROSSING = {
+    "nodes": {
+        "A": {"position": [0, 0, 0], "support": "clamped"},
+        "B": {"position": [1, 0, 0]},
+        "C": {"position": [0.6, -0.5, -0.1], "support": "clamped"},
+        "D": {"position": [0.6, 0.5, -0.1]},
+    },
+    "members": {"beam": {"nodes": ["A", "B"], "section": "s"}, "post": {"nodes": ["C", "D"], "section": "s"}},
+    "contacts": {"c": {"type": "members", "members": "all", "radius": 0.04}},
+}
+"""A beam over a post across it, without sections."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scenes import CARRIED, CROSSING
 
 from sfetcas import Scene, SceneError, SolveError, Status, solve
 from sfetcas.dynamics.modes import _displacements
@@ -132,26 +133,6 @@ def test_what_lies_as_a_whole_slides_or_sticks(kind, friction):
 
 SPACE = {"sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8, "rhoA": 1.0}}, "dimension": "space"}
 UPRIGHT = {"type": "plane", "point": [0, 0, -0.3], "normal": [0, 0, 1]}
-CARRIED = {
-    "nodes": {
-        "A": {"position": [0, 0], "support": "clamped"},
-        "B": {"position": [1, 0]},
-        "C": {"position": [0.6, -1], "support": "clamped"},
-        "D": {"position": [0.6, -0.4]},
-    },
-    "members": {"beam": {"nodes": ["A", "B"], "section": "s"}, "post": {"nodes": ["C", "D"], "section": "s"}},
-    "contacts": {"c": {"type": "circle", "center": [0.6, -0.3], "radius": 0.15, "member": "beam", "node": "D"}},
-}
-SLIDERS = {
-    "nodes": {
-        "A": {"position": [0, 0, 0], "support": "clamped"},
-        "B": {"position": [1, 0, 0]},
-        "C": {"position": [0.6, -0.5, -0.1], "support": "clamped"},
-        "D": {"position": [0.6, 0.5, -0.1]},
-    },
-    "members": {"beam": {"nodes": ["A", "B"], "section": "s"}, "post": {"nodes": ["C", "D"], "section": "s"}},
-    "contacts": {"c": {"type": "members", "members": "all", "radius": 0.04}},
-}
 LIFTED = table({"type": "plane", "point": [0, 0], "normal": [0, 1]}, (0, 1), accuracy=1e-7)
 LIFTED["nodes"]["A"]["support"] = "hinge"
 LIFTED["loads"] |= heavy(5.0)
@@ -165,7 +146,7 @@ LIFTED["loads"] |= heavy(5.0)
         (table({"type": "point", "position": [0.6, -0.1], "side": [0, 1]}), [1]),
         (table(UPRIGHT, (0.3, 0.2, -2), **SPACE), [1, 2]),
         (table({}, (0, -2), **CARRIED), [1]),
-        (table({}, (0.05, 0.02, -1), **SPACE, **SLIDERS), [2]),
+        (table({}, (0.05, 0.02, -1), **SPACE, **CROSSING), [2]),
         (LIFTED, [1]),
     ],
     ids=["drum", "radius", "edge", "plane in space", "carried", "crossing", "line"],

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scenes import CARRIED, CROSSING
 
 from sfetcas import Measurement, Scene, SceneError, SolveError, Status, fit, parametric, solve
 from sfetcas.parametric.arguments import with_values
@@ -34,26 +35,6 @@ def told(scene, names):
 
 
 SPACE = {"sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8}}, "dimension": "space"}
-CARRIED = {
-    "nodes": {
-        "A": {"position": [0, 0], "support": "clamped"},
-        "B": {"position": [1, 0]},
-        "C": {"position": [0.6, -1], "support": "clamped"},
-        "D": {"position": [0.6, -0.4]},
-    },
-    "members": {"beam": {"nodes": ["A", "B"], "section": "s"}, "post": {"nodes": ["C", "D"], "section": "s"}},
-    "contacts": {"c": {"type": "circle", "center": [0.6, -0.3], "radius": 0.15, "member": "beam", "node": "D"}},
-}
-CROSSING = {
-    "nodes": {
-        "A": {"position": [0, 0, 0], "support": "clamped"},
-        "B": {"position": [1, 0, 0]},
-        "C": {"position": [0.6, -0.5, -0.1], "support": "clamped"},
-        "D": {"position": [0.6, 0.5, -0.1]},
-    },
-    "members": {"beam": {"nodes": ["A", "B"], "section": "s"}, "post": {"nodes": ["C", "D"], "section": "s"}},
-    "contacts": {"c": {"type": "members", "members": "all", "radius": 0.04}},
-}
 EDGE = {"type": "point", "position": [0.6, -0.1], "side": [0, 1]}
 WALL = {"type": "plane", "point": [0, 0, -0.3], "normal": [0, 0, 1]}
 
