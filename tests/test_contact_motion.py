@@ -371,8 +371,11 @@ def test_it_begins_where_a_short_stretch_lies_on_the_floor(stop):
     motion = solve(lying(**held))
     static = solve(lying(**held, analysis={}), accuracy=1e-6).last
     first, cuts = motion.steps[0], motion.last.model.mesh.cuts["m"]
-    for at in static.contacts["floor"]["at"]:
-        assert min(np.abs(cuts - at)) < 1e-4
+    begin, end = static.contacts["floor"]["at"]
+    # Its ends alone stand for so short a stretch: its weight between them moves them by a twelfth of its share.
+    moved = G * (end - begin) ** 2 / 12.0
+    for at, force in ((begin, 2.5), (end, 0.8)):
+        assert min(np.abs(cuts - at)) < moved / force
     assert not motion.events
     np.testing.assert_allclose(
         first.contacts["floor"]["force"], static.contacts["floor"]["force"], rtol=4e-2, atol=1e-9
