@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.contact_chain import NotAChainError
+from benchmarks.contact_chain import QUARTERS, NotAChainError
 from benchmarks.contact_oracle import chain_contact
 from benchmarks.contact_scenes import FAMILIES, contact_scene
+from sfetcas import Scene, solve
 
 TIP = [0.445004402246249, 0.810609024880296]
 """Of a cantilever under F L^2/EI = 10, elliptic integrals."""
@@ -123,3 +124,15 @@ def test_contact_is_judged(capsys):
     main(["contact", "--count", "1", "--first", "1", "--family", "drums"])
     table = capsys.readouterr().out.strip().splitlines()
     assert table[-1].startswith("| drums | 1 |")
+
+
+@pytest.mark.parametrize("seed", [102, 217])
+def test_lines_on_floors_are_where_the_chain_is(seed):
+    """A heavy strip that stays flat though what presses it would buckle it without its weight, and a line that ends at
+    elements at the end of its member.
+    """
+    table = contact_scene("floors", seed)
+    step, chain = solve(Scene.from_dict(table)).last, chain_contact(table)
+    for name, places in chain.members.items():
+        # The error of chains is that of the finer of two, which is a third of their difference, and of depths.
+        np.testing.assert_allclose(step.along(name, QUARTERS)["position"], places, atol=2.0 * chain.error)

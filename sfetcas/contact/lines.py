@@ -201,7 +201,8 @@ class Lines:
             cut = e if x - cuts[e] < cuts[e + 1] - x else e + 1
             within = {cut - 1, cut} & pressed
             taken |= {cut - 1, cut} - within if len(within) == 1 else set()
-        return taken
+        # Beyond the ends of the member there are none.
+        return taken & set(range(len(cuts) - 1))
 
     def deepest(self, fields: Fields, points: Sequence[ContactPoint], tolerance: float) -> list[Near]:
         """Of ends of elements on lines that penetrate, and are none of given points, those that do so more than the
