@@ -256,7 +256,7 @@ def undeformed(pilot: Prepared) -> Solved:
     """The undeformed scene as a state."""
     nothing = pilot.model.loading(0.0, 0.0)
     state = pilot.equations.start(nothing)
-    return Solved(pilot, state, nothing, pilot.equations.at(state, nothing), 0.0)
+    return Solved.taken(pilot, state, nothing)
 
 
 def on_way(begin: float, end: float, part: float) -> Callable[[Model], Loading]:

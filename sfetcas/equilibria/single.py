@@ -102,8 +102,7 @@ def unjudged(found: Solved) -> Equilibrium:
 
 def solved_from(found: Equilibrium) -> Solved:
     """An answer as it was solved, on its own mesh."""
-    own = Prepared(found.model)
-    return Solved(own, found.state, found.loading, own.equations.at(found.state, found.loading), 0.0)
+    return Solved.taken(Prepared(found.model), found.state, found.loading)
 
 
 HIDDEN = (

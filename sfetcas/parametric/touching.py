@@ -50,7 +50,7 @@ class Touching:
         mesh = arguments.mesh_at(scene, model.mesh)
         own = Prepared(assemble(scene, mesh, assembly=model.assembly, scales=model.scales))  # type: ignore[arg-type]
         loading, state = own.model.loading(scene.analysis.steps[-1]), arguments.program.state(flat)
-        return kept_of(scene, self.settings, Solved(own, state, loading, own.equations.at(state, loading), 0.0))
+        return kept_of(scene, self.settings, Solved.taken(own, state, loading))
 
     def refuse_doubt(self, solver: EquilibriumSolver, numbers: Array, flat: Array) -> None:
         """Refuse derivatives where they differ to the sides of a change.

@@ -23,6 +23,7 @@ from ..contact.member_contact import MemberContact
 from ..description.records import enumerated
 from ..description.scene import Scene
 from ..equilibria.member_contact_steps import undeformed
+from ..equilibria.single import solved_from
 from ..equilibria.solution import Equilibrium
 from ..errors import LIMITS, SceneError, SolveError, Status
 from ..mathematics.arrays import Array
@@ -31,7 +32,7 @@ from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Mesh
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.beginning import begin_path, begun_at, beside_zero
-from ..solvers.prepared import Prepared, Solved
+from ..solvers.prepared import Prepared
 from ..solvers.redundancy import redundant
 from .conditions import NEAR, Begun, Choice, Conditions, Way
 from .lying import Lying, Piece
@@ -207,11 +208,10 @@ class Touching(Conditions[_At]):
     ) -> Begun:
         """The first point at a factor at which something touches already."""
         near, mesh = self.beside(factor), prepared(Choice()).model.mesh
-        own = Prepared(near.model)
-        source = Solved(own, near.state, near.loading, own.equations.at(near.state, near.loading), 0.0)
+        source = solved_from(near)
         points = points_of(source)
         if lies_along(points):
-            return begun_at(own, near.state, factor, notes, span)
+            return begun_at(source.prepared, near.state, factor, notes, span)
         found = self.run.resolved(mesh, points, source, lambda model: model.loading(factor))
         lines = [point for point in points if self.run.lines.has(point)]
         if lines:

@@ -433,6 +433,11 @@ class Solved:
     first: float = 0.0
     second: float = 0.0
 
+    @classmethod
+    def taken(cls, prepared: Prepared, state: State, loading: Loading) -> Solved:
+        """A state that is taken for an equilibrium, without looking whether it is one."""
+        return cls(prepared, state, loading, prepared.equations.at(state, loading), 0.0)
+
     @property
     def equations(self) -> Equations:
         """The stationarity equations of the model."""
