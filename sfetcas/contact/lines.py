@@ -11,7 +11,7 @@ line, and elements are halved where it ends.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +25,7 @@ from ..mechanics.segments import SAME_CUT, standing
 from ..solvers.prepared import Solved
 from .closest import Closest, Near, Pair, PairKey
 
-__all__ = ["LINE", "SHORT_LINE", "Lines", "Points", "begun", "lies_along", "points_in", "points_of"]
+__all__ = ["LINE", "SHORT_LINE", "Lines", "Points", "begun", "ends_of", "lies_along", "points_in", "points_of"]
 
 Points = tuple[ContactPoint, ...]
 
@@ -50,8 +50,10 @@ MORE = 3
 ASIDE, AHEAD = 4e-6, 0.2
 """How far beside a point it is seen how the member bends away: a fraction of its length, and a share of the element."""
 
-NEXT = 2e-4
-"""Length of an element, over the unit of length, of which no halves are made: what it yields goes with its cube."""
+NEXT = 1e-2
+"""Length of an element on a line, over the unit of length, of which no halves are made: how far forces at its ends bend it
+goes with its cube, so that rounding of gaps leaves a share of 1e-10 of them open here, and 1e-4 in a hundredth of it.
+"""
 
 SLIVER = 0.25
 """Share of an element up to which its end is moved to a place, rather than that another one is made there."""
@@ -135,7 +137,7 @@ class Lines:
             if pair.stop is None:
                 continue
             cuts, own = mesh.cuts[pair.members[0]], [p.at[0] for p in points if p.pair == key]
-            ends = self._ending(mesh, points, key)
+            ends = self._known_ends(mesh, points, key)
             near = {one.at[0]: one for one in self.closest.along(fields, pair, mesh, np.inf)}
             on = np.isin(cuts, own) | np.array([near[x].gap < 0.0 for x in cuts.tolist()])
             beyond = np.clip(np.searchsorted(cuts, ends), 1, len(cuts) - 1)
@@ -149,7 +151,7 @@ class Lines:
         return found
 
     @staticmethod
-    def _ending(mesh: Mesh, points: Iterable[ContactPoint], key: PairKey) -> list[float]:
+    def _known_ends(mesh: Mesh, points: Iterable[ContactPoint], key: PairKey) -> list[float]:
         """Where a line on an obstacle ends of which that is known."""
         own = (p for p in points if p.pair == key and all(p.sides))
         return [p.at[0] for p in own if slides(p) or standing(mesh, p, 0) is None]
@@ -163,11 +165,11 @@ class Lines:
         for point in laid:
             pair = point.pair
             if not all(point.sides):
-                taken.setdefault(pair, self._taken(mesh, points, pair))
+                taken.setdefault(pair, self._without_pressure(mesh, points, pair))
                 found = self.element_of(mesh, point)
                 no = found is not None and found[1] in taken[pair]
             else:
-                no = self.chosen(pair) and bool(self._ending(mesh, points, pair))
+                no = self.chosen(pair) and bool(self._known_ends(mesh, points, pair))
                 no |= point.at[0] in (0.0, 1.0) and self._node(point) in self._nodes(points, pair)
             allowed += [] if no else [point]
         return allowed
@@ -187,12 +189,12 @@ class Lines:
         others = (p for p in points if p.contact == pair[0] and p.pair != pair and all(p.sides) and len(p.at) == 1)
         return {self._node(p) for p in others if p.at[0] in (0.0, 1.0)}
 
-    def _taken(self, mesh: Mesh, points: Iterable[ContactPoint], key: PairKey) -> set[int]:
+    def _without_pressure(self, mesh: Mesh, points: Iterable[ContactPoint], key: PairKey) -> set[int]:
         """The elements within which a line ends of which that is known; where elements end there, those beyond it."""
         cuts, taken = mesh.cuts[key[1][0]], set[int]()
         own = [p for p in points if p.pair == key]
         pressed = {found[1] for found in (self.element_of(mesh, p) for p in own) if found}
-        for x in self._ending(mesh, own, key):
+        for x in self._known_ends(mesh, own, key):
             e = int(np.clip(np.searchsorted(cuts, x) - 1, 0, len(cuts) - 2))
             margin = AT_END * float(cuts[e + 1] - cuts[e])
             if cuts[e] + margin < x < cuts[e + 1] - margin:
@@ -214,7 +216,7 @@ class Lines:
             cuts = fields.model.mesh.cuts[pair.members[0]]
             known = {p.at[0] for p in points if p.pair == pair.key}
             # What is within the element in which a line ends is seen when elements end there.
-            taken = self._taken(fields.model.mesh, points, key) if self.chosen(key) else set()
+            taken = self._without_pressure(fields.model.mesh, points, key) if self.chosen(key) else set()
             known |= {float(cuts[i]) for e in taken for i in (e, e + 1)}
             along = self.closest.along(fields, pair, fields.model.mesh, 0.0)
             near = {one.at[0]: one for one in along if one.at[0] not in known}
@@ -326,15 +328,19 @@ class Lines:
             return float(first), float(last), float(cuts[first]), float(cuts[last]), False
         return float(cut), float(cut), at, at, slides(point)
 
-    def ended(self, found: Solved, points: Sequence[ContactPoint], pushes: Array) -> tuple[Points, int]:
-        """Points of which one stands for all that presses on the last element at each end of a line, and none within
+    def with_sliding_ends(
+        self, found: Solved, points: Sequence[ContactPoint], pushes: Array, lines: Mapping[PairKey, list[list[float]]]
+    ) -> tuple[Points, int]:
+        """Points of which one stands for all that presses on the last element at each end of lines, and none within
         presses at a point; how many are others.
+
+        ``lines`` are those of :meth:`followed`.
         """
         kept, new, mesh = list(points), list[ContactPoint](), found.model.mesh
         force = {p.key: max(push, 0.0) for p, push in zip(points, pushes.tolist(), strict=True)}
-        for key, stretches in self.stretches(found, LIFTED * self.scene.size).items():
+        for key, stretches in lines.items():
             longest = PARTED * found.model.scales.length / self.closest.lengths[key[1][0]]
-            for stretch in stretches if self.chosen(key) and key[1][0] not in self.fixed else ():
+            for stretch in stretches:
                 sides = [(stretch[0], stretch[1:2]), (stretch[-1], stretch[-2:-1])]
                 if len(stretch) <= FEW and stretch[-1] - stretch[0] < longest:
                     # What is so short is seen as one point, see :meth:`parted`.
@@ -353,11 +359,9 @@ class Lines:
                     # It stays until its force is known, as what begins to touch does.
                     still = ContactPoint(*key, (at,), (False,), outer[0].distance, normal=normal)
                     kept, new = [p for p in kept if p not in outer], [*new, still]
-        ends, every = self.ends(found), (*points, *new)
-        inner = [
-            p for p in kept if all(p.sides) and self.has(p) and self.chosen(p.pair) and (p.pair, p.at[0]) not in ends
-        ]
-        inner = [p for p in inner if self._ending(mesh, every, p.pair)]
+        ends, every = ends_of(lines), (*points, *new)
+        points_within = (p for p in kept if all(p.sides) and self.has(p) and p.pair in lines)
+        inner = [p for p in points_within if (p.pair, p.at[0]) not in ends and self._known_ends(mesh, every, p.pair)]
         return (*(p for p in kept if p not in inner), *new), len(new) + len(inner)
 
     def _within(
@@ -377,14 +381,14 @@ class Lines:
         """Whether a member is on an obstacle at its end."""
         return self.closest.gap_at(fields, key, end) < LIFTED * self.scene.size
 
-    def known(self, points: Iterable[ContactPoint]) -> bool:
+    def ends_slide(self, points: Iterable[ContactPoint]) -> bool:
         """Whether it is known where a line ends."""
         return any(slides(p) and p.pair in self.keys and self.chosen(p.pair) for p in points)
 
-    def unended(self, mesh: Mesh, points: Points, fields: Fields) -> Points:
+    def without_sliding_ends(self, mesh: Mesh, points: Points, fields: Fields) -> Points:
         """Points with what may press at the ends of elements beside them for those that slide where lines end."""
-        kept = [p for p in points if not self.known([p])]
-        for p in (p for p in points if self.known([p])):
+        kept = [p for p in points if not self.ends_slide([p])]
+        for p in (p for p in points if self.ends_slide([p])):
             cuts, pair = mesh.cuts[p.members[0]], self.closest.pairs[p.pair]
             i = int(np.clip(np.searchsorted(cuts, p.at[0]), 1, len(cuts) - 1))
             near = [n for n in self.closest.along(fields, pair, mesh, np.inf) if n.at[0] in (cuts[i - 1], cuts[i])]
@@ -392,15 +396,10 @@ class Lines:
             kept += [k for k in self.allowed(mesh, kept, self.laid(near)) if (k.at, k.sides) not in have]
         return tuple(kept)
 
-    def ends(self, found: Solved) -> set[tuple[PairKey, float]]:
-        """Where lines for which it is chosen what presses begin and end: there what presses at a point may slide."""
-        return {
-            (key, end)
-            for key, stretches in self.stretches(found, LIFTED * self.scene.size).items()
-            if self.chosen(key) and key[1][0] not in self.fixed
-            for stretch in stretches
-            for end in (stretch[0], stretch[-1])
-        }
+    def followed(self, found: Solved) -> dict[PairKey, list[list[float]]]:
+        """The stretches of lines whose ends slide: on obstacles, of members whose mesh is not prescribed."""
+        every = self.stretches(found, LIFTED * self.scene.size)
+        return {key: own for key, own in every.items() if self.chosen(key) and key[1][0] not in self.fixed}
 
     def points_on(self, mesh: Mesh, found: Solved) -> Points:
         """The points of a state on a finer mesh, with those of lines at new ends of elements between old ones."""
@@ -434,14 +433,13 @@ class Lines:
         )
         return replace(mesh, cuts=cuts, points=()), kept
 
-    def moved(self, before: Mesh, after: Mesh) -> dict[str, float]:
-        """How far, over the size, ends of elements of each member are moved, or are from any that there were."""
-        return {
-            name: float(np.abs(cuts[:, None] - before.cuts[name]).min(axis=1).max())
-            * self.scene.center_lines[name].length
-            / self.scene.size
+    def moved(self, before: Mesh, after: Mesh) -> float:
+        """How far, over the size, ends of elements are from any that there were, at most."""
+        far = (
+            float(np.abs(cuts[:, None] - before.cuts[name]).min(axis=1).max()) * self.scene.center_lines[name].length
             for name, cuts in after.cuts.items()
-        }
+        )
+        return max(far, default=0.0) / self.scene.size
 
     def _with_end(self, cuts: Array, member: str, x: float, keeps: bool) -> Array:
         """Ends of elements of a member with one at a place; as many as before if it ``keeps`` their number."""
@@ -459,11 +457,13 @@ class Lines:
         Where members lie, two forces nearer to each other do what one does, to rounding.
         """
         mesh, unit = found.model.mesh, found.model.scales.length
-        lie = {key[1][0] for key in self.keys}
-        return {
-            name: (np.diff(cuts) * self.scene.center_lines[name].length > NEXT * unit) | (name not in lie)
-            for name, cuts in mesh.cuts.items()
-        }
+        marks = {name: np.ones(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
+        for (_, (member, *_)), stretches in self.stretches(found).items():
+            cuts = mesh.cuts[member]
+            short = np.diff(cuts) * self.scene.center_lines[member].length <= NEXT * unit
+            for stretch in stretches:
+                marks[member] &= ~short | (cuts[1:] <= stretch[0]) | (cuts[:-1] >= stretch[-1])
+        return marks
 
     def rough_ends(self, found: Solved, accuracy: float) -> dict[str, Array]:
         """Marks of the elements, by member, in which lines end and where that is therefore not known well enough.
@@ -491,12 +491,12 @@ class Lines:
 
     def parted(
         self, found: Solved, deep: float, turned: float, known: Collection[PairKey] = ()
-    ) -> tuple[Mesh, Points, PairKey] | None:
-        """Mesh and points with the two ends of a short line in place of one point, and what touches there.
+    ) -> tuple[Mesh, Points, PairKey | None] | None:
+        """Mesh and points with the two ends of a short line in place of one point, and of which pair that is.
 
         From such a point a member bends into its obstacle, by more than ``deep``, m, or so that all beyond is turned by
-        more than ``turned``, rad.  None where there is none, but of ``known`` ones; at first the mesh with elements
-        that end there.
+        more than ``turned``, rad.  None where there is none, but of ``known`` pairs; at first a mesh with elements
+        that end there, of no pair.
         """
         points = points_of(found)
         for i, point in enumerate(points):
@@ -508,7 +508,7 @@ class Lines:
             if not 0 < cut < len(cuts) - 1 or abs(cuts[cut] - at) > AT_END * (cuts[cut + 1] - cuts[cut - 1]):
                 near = self.closest.found(found.fields, -deep, [self.closest.pairs[point.pair]])
                 if any(abs(one.at[0] - at) < np.diff(cuts).max() for one in near):
-                    return self.fitted(mesh, (point,))[0], points, ("", ())
+                    return *self.fitted(mesh, points), None
                 continue
             low, high, depth, angle = self._ends_of(found, point, cut)
             short = (high - low) * self.closest.lengths[member] < PARTED * found.model.scales.length
@@ -572,6 +572,11 @@ def points_in(fields: Fields) -> Points:
         replace(point, at=fields.contact_point(point)["at"]) if any(point.slides) else point
         for point in fields.model.mesh.points
     )
+
+
+def ends_of(lines: Mapping[PairKey, list[list[float]]]) -> set[tuple[PairKey, float]]:
+    """Where lines begin and end."""
+    return {(key, end) for key, own in lines.items() for stretch in own for end in (stretch[0], stretch[-1])}
 
 
 def slides(one: ContactPoint | Near) -> bool:

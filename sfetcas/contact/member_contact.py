@@ -38,7 +38,7 @@ from ..solvers.pseudo_transient import Drag
 from .closest import Closest, Near, PairKey
 from .edges import Edges
 from .gripping import FIRM, Gripping, Placed
-from .lines import LINE, SHORT_LINE, Lines, Points, begun, points_of
+from .lines import LINE, SHORT_LINE, Lines, Points, begun, ends_of, points_of
 
 __all__ = ["FITS", "MemberContact"]
 
@@ -75,7 +75,7 @@ SUDDEN = 3.0
 """How many times faster than in the step before what is followed may turn, where it turns by a little at all."""
 
 FITS = 3
-"""Times that elements are made to end where points slide: each time what that moves these by falls to its square."""
+"""Times that elements are made to end where points slide, at most: each time these move by a small share of that."""
 
 PATIENT = 2.0**-6
 """Step down to which the ends of lines are followed; in shorter ones they are sought anew."""
@@ -160,6 +160,8 @@ class MemberContact:
     lines : Lines
         The lines along which members touch.
     edges : Edges
+    patient : bool
+        Whether a step is rather given up than that ends of lines are sought anew.
     across : callable or None
         Model -> its curve and a direction on it: where it is given the factor of the loads is an unknown, from that of
         the near state on, and the equilibrium one across the direction, see :meth:`.Curve.corrected`.
@@ -255,7 +257,7 @@ class MemberContact:
         prepared = self.prepare(replace(mesh, points=tuple(self.lines.set_out(mesh, points))))
         nothing = prepared.model.loading(0.0, 0.0)
         state = self.carried(start, prepared)
-        return Solved(prepared, state, nothing, prepared.equations.at(state, nothing), 0.0)
+        return Solved.taken(prepared, state, nothing)
 
     def _ends(self, near: Near | ContactPoint) -> list[tuple[str, str]]:
         """The contact and the node, where a member touches an obstacle at its end."""
@@ -462,13 +464,13 @@ class MemberContact:
         at ends of elements show where they end, and these slide from there.
         """
         lines, found = self.lines.keys, None
-        known = self.lines.known(points)
+        known = self.lines.ends_slide(points)
         if known:
             found = self._resolved(mesh, points, source, way, drag, True)
         if found is None and not (known and self.patient):
             self.lines.keys = lines
             if known:
-                points = self.lines.unended(mesh, points, source.fields)
+                points = self.lines.without_sliding_ends(mesh, points, source.fields)
             found = self._resolved(mesh, points, source, way, drag, False)
             if found is not None and not drag and any(map(self.lines.chosen, self.lines.keys)):
                 lines = self.lines.keys
@@ -504,7 +506,7 @@ class MemberContact:
             parted = None if careful or lined else self.lines.parted(found, self.tolerance, np.inf, short)
             if parted is not None:
                 lined = parted[:2]
-                short |= {parted[2]}
+                short |= set() if parted[2] is None else {parted[2]}
             if lined is not None:
                 (mesh, points), several = lined, False
             else:
@@ -532,7 +534,8 @@ class MemberContact:
         told = [fields.contact_point(point) for point in points]
         now = [replace(point, at=entry["at"]) for point, entry in zip(points, told, strict=True)]
         pushes = np.array([entry["push"] for entry in told])
-        ends = self.lines.ends(found) if ended else set()
+        lines = self.lines.followed(found) if ended else {}
+        ends = ends_of(lines)
         wrong = self._wrong(found, now, pushes)
         more = self._penetrating(fields, [point for point, off in zip(now, wrong, strict=True) if not off])
         states = ["wrong" if off else "right" for off in wrong] + ["new"] * len(more)
@@ -551,7 +554,7 @@ class MemberContact:
             begins = {p.pair for p, old in zip(slid, kept, strict=True) if p.slides != old.slides and len(p.at) == 1}
             more = tuple(point for point in more if point.pair not in begins)
             return (*slid, *more), int(wrong.sum()) + len(more) + len(begins)
-        new, count = self.lines.ended(found, now, pushes) if ended else ((), 0)
+        new, count = self.lines.with_sliding_ends(found, now, pushes, lines) if ended else ((), 0)
         if count:
             return new, 2
         kept = self._merged(now, pushes)
@@ -809,7 +812,7 @@ class MemberContact:
         for _ in range(times):
             before = found.model.mesh
             mesh, points = self.lines.fitted(before, points_of(found), prescribed=prescribed)
-            if max(self.lines.moved(before, mesh).values(), default=0.0) < self.accuracy:
+            if self.lines.moved(before, mesh) < self.accuracy:
                 break
             there = self.resolved(mesh, points, found, way)
             if there is None or self.turned(found.fields, there.fields) > STRIDE:

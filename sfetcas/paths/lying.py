@@ -16,7 +16,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..contact.closest import PairKey
 from ..contact.lines import Points, lies_along, points_of
 from ..contact.member_contact import FITS, MemberContact
 from ..mathematics.arrays import TINY
@@ -40,10 +39,6 @@ ASIDE = 1e-6
 
 BEGINS = 0.02
 """Length of a line when it begins, over that of its member: where it ends is found from there."""
-
-BESIDE, SEEN = 4e-6, 0.02
-"""How far beside the end of a line, and over which length, it is seen how a member bends away: fractions of its length.
-"""
 
 SHARPEST = 2.5
 """More than this many times the angle that steps aim at is too much: the point is on another branch."""
@@ -128,7 +123,7 @@ class Lying:
         curve = self.curve(now)
         state, factor = curve.predicted(now, length)
         loading = curve.loading(factor)
-        return Solved(now.prepared, state, loading, curve.equations.at(state, loading), 0.0)
+        return Solved.taken(now.prepared, state, loading)
 
     def along(self, now: Standing, prepared: Prepared) -> tuple[Curve, Tangent]:
         """The curve of another model, and on it the tangent at a point: its rotations and its factor."""
@@ -150,26 +145,23 @@ class Lying:
         run.lines.keys = frozenset(one.pair for one in (*begins, *points) if one in begins or lies_along([one]))
         run.lines.finer = self.finer
         run.edges.begin(now.fields)
-        found = run.resolved(*self._laid(source, now, begins), source, way)
+        found = run.resolved(*self._laid(source, begins), source, way)
         found = None if found is None else run.fitted(found, way, fits)
         if found is None or run.turned(now.fields, found.fields) > STRIDE or run.passed(now.fields, found.fields):
             return None
         return found
 
-    def _laid(self, source: Solved, now: Solved, begins: Sequence[ContactPoint]) -> tuple[Mesh, Points]:
-        """The elements, with those that lines need, and the places along these and elsewhere.
+    def _laid(self, source: Solved, begins: Sequence[ContactPoint]) -> tuple[Mesh, Points]:
+        """The elements, with those that lines need, and the places along these and elsewhere, of an expected state.
 
-        Lines are those of the point ``now``, where they end is told by the state ``source`` that is expected.
+        Where lines end that slides: it is where it is expected.
         """
         run, mesh, lines, points = self.run, self.mesh, self.run.lines, points_of(source)
-        parts: dict[PairKey, list[tuple[float, float]]] = {
-            key: [self._expected(source, key, part[0], part[-1]) for part in stretches]
-            for key, stretches in lines.stretches(now).items()
-        }
+        parts = {key: [(part[0], part[-1]) for part in own] for key, own in lines.stretches(source).items()}
         for one in begins:
             at = min(max(one.at[0], 0.0), 1.0)
             parts.setdefault(one.pair, []).append((max(at - BEGINS, 0.0), min(at + BEGINS, 1.0)))
-        kept = [point for point in points if point.pair not in parts]
+        kept = [point for point in points if point.pair not in parts or any(point.slides)]
         for key, stretches in parts.items():
             pair = run.closest.pairs[key]
             places = [x for part in stretches for x in part]
@@ -179,24 +171,9 @@ class Lying:
             near = run.closest.along(source.fields, run.closest.pairs[key], mesh, np.inf)
             laid = lines.laid(one for one in near if any(a <= one.at[0] <= b for a, b in stretches))
             # Within a line nothing presses at a point.
-            ends = {x for part in stretches for x in part}
+            ends = {x for part in stretches for x in part} - {x for point in kept for x in point.at}
             kept += [point for point in laid if not all(point.sides) or point.at[0] in ends]
         return replace(mesh, points=()), tuple(kept)
-
-    def _expected(self, source: Solved, key: PairKey, begin: float, end: float) -> tuple[float, float]:
-        """Where a line in a state that is expected ends that ended at two places before.
-
-        Beyond its ends the curvature of the gap grows from zero.  A line grows or shrinks to a part of itself at most.
-        """
-        room, ends = 0.4 * (end - begin), [begin, end]
-        for i, way in enumerate((-1, 1)):
-            if room and 0.0 < ends[i] < 1.0:
-                places = BESIDE + SEEN * np.array([0.0, 0.5, 1.0])
-                bends = [self.run.closest.bends(source.fields, key, ends[i] + way * x) for x in places]
-                grows, first = np.polyfit(places, bends, 1)
-                apart = -first / grows if grows > 0.0 else -np.sign(first) * room
-                ends[i] = float(np.clip(ends[i] + way * np.clip(apart, -room, room), 0.0, 1.0))
-        return ends[0], ends[1]
 
     # -- from point to point --------------------------------------------------------------------
 
