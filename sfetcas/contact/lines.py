@@ -55,6 +55,9 @@ NEXT = 1e-2
 goes with its cube, so that rounding of gaps leaves a share of 1e-10 of them open here, and 1e-4 in a hundredth of it.
 """
 
+SHARE = 0.25
+"""As ``NEXT``, a share of short lines."""
+
 SLIVER = 0.25
 """Share of an element up to which its end is moved to a place, rather than that another one is made there."""
 
@@ -459,10 +462,11 @@ class Lines:
         mesh, unit = found.model.mesh, found.model.scales.length
         marks = {name: np.ones(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
         for (_, (member, *_)), stretches in self.stretches(found).items():
-            cuts = mesh.cuts[member]
-            short = np.diff(cuts) * self.scene.center_lines[member].length <= NEXT * unit
+            cuts, length = mesh.cuts[member], self.scene.center_lines[member].length
             for stretch in stretches:
-                marks[member] &= ~short | (cuts[1:] <= stretch[0]) | (cuts[:-1] >= stretch[-1])
+                least = min(NEXT * unit / length, SHARE * (stretch[-1] - stretch[0]))
+                short = (np.diff(cuts) <= least) & (cuts[1:] > stretch[0]) & (cuts[:-1] < stretch[-1])
+                marks[member] &= ~short
         return marks
 
     def rough_ends(self, found: Solved, accuracy: float) -> dict[str, Array]:
