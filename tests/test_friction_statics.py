@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, fsolve
 
 from sfetcas import Scene, SceneError, SolveError, cli, dump, solve
 
@@ -277,6 +278,48 @@ def test_what_lies_on_a_floor_is_pressed_all_along():
     np.testing.assert_allclose(along["force"][:, 1], 0.0, atol=1e-6)
     np.testing.assert_allclose(along["moment"], 0.0, atol=1e-6)
     np.testing.assert_allclose(step.contacts["floor"]["force"], [-1.0, 8.0, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("friction", [0.3, 0.8])
+def test_heavy_cantilever_slides_on_a_rough_floor_as_the_elastica_does(friction):
+    """What hangs is an elastica to where all that lies pulls it back by its weight and by the force at that end."""
+    weight, height = 30.0, 0.2
+
+    def lands(unknown):
+        touches, push, moment = unknown
+        along = friction * (push + weight * (1.0 - touches))
+
+        def change(s, u):
+            across = push - weight * (touches - s)
+            return [np.cos(u[2]), np.sin(u[2]), u[3], along * np.sin(u[2]) - across * np.cos(u[2])]
+
+        begin = [0.0, height, 0.0, moment]
+        return solve_ivp(change, (0.0, touches), begin, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+
+    # Without friction it lies from 0.845 on.
+    found = fsolve(lambda z: lands(z)[1:], [0.85, 8.0, -3.5], xtol=1e-13)
+    touches, push, _ = found
+    tip = lands(found)[0] + 1.0 - touches
+    step = solve(
+        Scene.from_dict(
+            {
+                "gravity": [0, -weight],
+                "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
+                "nodes": {"A": {"position": [0, height], "support": "clamped"}, "B": {"position": [1, height]}},
+                "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+                "contacts": {"floor": FLOOR | {"friction": friction}},
+                "analysis": {"accuracy": 1e-3},
+            }
+        )
+    ).last
+    floor = step.contacts["floor"]
+    assert not floor["sticking"]
+    # On elements that end where it begins to lie the answer is much better than the accuracy that was asked for.
+    assert step.position("B")[0] == pytest.approx(tip, abs=1e-6)
+    # What presses within the last element, 0.02 long here, moves it by a part of that.
+    assert floor["at"][0] == pytest.approx(touches, abs=5e-3)
+    pressed = push + weight * (1.0 - touches)
+    np.testing.assert_allclose(floor["force"], [friction * pressed, pressed, 0.0], rtol=1e-4)
 
 
 def test_a_heavy_rope_over_a_rough_drum_stays_though_one_end_is_longer():

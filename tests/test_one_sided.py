@@ -120,12 +120,14 @@ def test_with_an_unknown_factor_the_solution_is_across_a_direction():
     curve = Curve(prepared, 1.0)
     now = curve.standing(step.fields.state, 1.0, Tangent(np.zeros(equations.total), 1.0))
     state, factor = curve.predicted(now, 0.01)
-    rows = [names.index(point.rows(2)[-1]) for point in step.model.mesh.points if not any(point.slides)]
+    rows = [
+        equations.unknowns + names.index(point.rows(2)[-1]) for point in step.model.mesh.points if not any(point.slides)
+    ]
     acting, border = np.ones(len(rows), bool), bordered(curve, now.tangent)
     # Rotations alone, to be added up again.
     border.row[equations.rotation_unknowns :] = 0.0
     loading = curve.loading(factor)
-    system = OneSided(equations, loading, prepared.weight, None, None, None, np.array(rows), acting, border)
+    system = OneSided(equations, loading, prepared.weight, pushing=np.array(rows), acting=acting, border=border)
     found = correct(system, state, factor=factor)
     assert found.converged
     turned = turned_between(equations, found.state, state)

@@ -115,7 +115,9 @@ class Gripping:
         if not coefficient:
             return point
         normal, vector, apart = self._normal(point, i, now), now.vectors[i], before.vectors[i]
-        if point.grip is None or self.since is None:
+        if point.grip is None and not point.new:
+            touched, share = np.zeros(3), 0.0
+        elif point.grip is None or self.since is None:
             # The share of the way to this state after which they touched.
             distance = self.closest.pairs[point.pair].distance
             begin, end = float(normal @ apart) - distance, float(normal @ vector) - distance

@@ -51,9 +51,12 @@ ASIDE, AHEAD = 4e-6, 0.2
 """How far beside a point it is seen how the member bends away: a fraction of its length, and a share of the element."""
 
 NEXT = 1e-2
-"""Length of an element on a line, over the unit of length, of which no halves are made: how far forces at its ends bend it
-goes with its cube, so that rounding of gaps leaves a share of 1e-10 of them open here, and 1e-4 in a hundredth of it.
+"""Length of an element on a line, over the unit of length, of which no halves are made: how far forces at its ends bend
+it goes with its cube, so that rounding of gaps leaves a share of 1e-10 of them open here, and 1e-4 in a hundredth of it.
 """
+
+MOSTLY = 0.9
+"""Share of what presses on the last element of a line from which on that does so where it ends."""
 
 SHARE = 0.25
 """As ``NEXT``, a share of short lines."""
@@ -83,12 +86,15 @@ class Lines:
         Contacts and members that touch along lines, at nodes of the first one.
     finer : float
         Share of the parts into which lines are divided that is taken.
+    ending : frozenset
+        Those with friction of which it is solved for where they end.
     """
 
     def __init__(self, scene: Scene, closest: Closest, fixed: Collection[str]) -> None:
         self.scene, self.closest, self.fixed = scene, closest, fixed
         self.keys: frozenset[PairKey] = frozenset()
         self.finer = 1.0
+        self.ending: frozenset[PairKey] = frozenset()
 
     # -- places -----------------------------------------------------------------------------------
 
@@ -97,8 +103,8 @@ class Lines:
         return self.scene.members[member].type != "rigid"
 
     def chosen(self, key: PairKey) -> bool:
-        """Whether it is solved for which places of a line push: on obstacles without friction."""
-        return self.closest.pairs[key].stop is not None and not self.scene.rubs
+        """Whether it is solved for where a line ends: on obstacles, with friction only where a way has ended."""
+        return self.closest.pairs[key].stop is not None and (key in self.ending or not self.scene.rubs)
 
     def has(self, one: ContactPoint | Near) -> bool:
         """Whether a place is one of those along a line: not where the second member ends, which slides on the first,
@@ -131,6 +137,24 @@ class Lines:
             yield replace(point, sides=(True, False))
         if at < 1.0:
             yield replace(point, sides=(False, True))
+
+    def ends_within(self, found: Solved) -> frozenset[PairKey]:
+        """Lines on obstacles of which members lift off at an end."""
+        fields, lines = found.fields, self.stretches(found)
+        beyond = [(key, 0.0, own[0][0]) for key, own in lines.items() if own]
+        beyond += [(key, own[-1][-1], 1.0) for key, own in lines.items() if own]
+        lifted = (
+            key for key, a, b in beyond if a < b and not self.closest.lies(fields, key, a, b, LIFTED * self.scene.size)
+        )
+        return frozenset(key for key in lifted if self.closest.pairs[key].stop is not None)
+
+    def halved(self, points: Iterable[ContactPoint]) -> Points:
+        """Points with those that may press on one element alone for those of lines that press on two."""
+        return tuple(
+            one
+            for p in points
+            for one in (self._laid(replace(p, grip=None, line=False)) if p.line and self.chosen(p.pair) else [p])
+        )
 
     def beside(self, mesh: Mesh, points: Sequence[ContactPoint], fields: Fields) -> list[ContactPoint]:
         """Places near those on lines on obstacles, or inside, that are none of given points."""
@@ -350,11 +374,12 @@ class Lines:
                     sides = [(stretch[0], stretch[-1:])]
                 for end, beside in sides:
                     outer = self._within(mesh, kept, key, min([end, *beside]), max([end, *beside]))
+                    pressed = sum(force[p.key] for p in outer)
                     if len(sides) > 1:
-                        known = any(all(p.sides) and (slides(p) or p.at[0] == end) for p in outer)
+                        at_end = [p for p in outer if all(p.sides) and (slides(p) or p.at[0] == end)]
+                        known = any(slides(p) or force[p.key] >= MOSTLY * pressed for p in at_end)
                     else:
                         known = all(all(p.sides) for p in outer) and (len(outer) == 1 or all(map(slides, outer)))
-                    pressed = sum(force[p.key] for p in outer)
                     if known or pressed == 0.0 or (end in (0.0, 1.0) and self._lies_at(found.fields, key, end)):
                         continue
                     at = sum(force[p.key] * self._middle(mesh, p) for p in outer) / pressed
@@ -402,11 +427,11 @@ class Lines:
     def followed(self, found: Solved) -> dict[PairKey, list[list[float]]]:
         """The stretches of lines whose ends slide: on obstacles, of members whose mesh is not prescribed."""
         every = self.stretches(found, LIFTED * self.scene.size)
-        return {key: own for key, own in every.items() if self.chosen(key) and key[1][0] not in self.fixed}
+        return {key: own for key, own in every.items() if self.chosen(key)}
 
     def points_on(self, mesh: Mesh, found: Solved) -> Points:
-        """The points of a state on a finer mesh, with those of lines at new ends of elements between old ones."""
-        points = points_of(found)
+        """The points of a state on another mesh, with those of lines at new ends of elements between old ones."""
+        points = tuple(p for p in points_of(found) if all(p.sides) or standing(mesh, p, 0) is not None)
         for key, stretches in self.stretches(found).items():
             known = {(p.at[0], p.sides) for p in points if p.pair == key}
             near = self.closest.along(found.fields, self.closest.pairs[key], mesh, np.inf)

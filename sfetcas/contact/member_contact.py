@@ -11,7 +11,7 @@ The loads are followed from zero in steps so short that no member passes through
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ import numpy as np
 from .. import tolerances
 from ..description.scene import Scene
 from ..errors import SceneError
-from ..mathematics.arrays import Array, numbers, unit
+from ..mathematics.arrays import Array, Index, numbers, unit
 from ..mechanics.accuracy import roughness
 from ..mechanics.contact_points import undeformed_vectors
 from ..mechanics.equations import State
@@ -31,7 +31,7 @@ from ..mechanics.segments import cuts_of_point, place_of_cut
 from ..solvers.arclength import Curve, Tangent, bordered
 from ..solvers.between_states import turned_between
 from ..solvers.continuation import JUMPED, near_factor
-from ..solvers.newton import Limits, correct
+from ..solvers.newton import Converged, Limits, correct
 from ..solvers.one_sided import OneSided
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
@@ -184,6 +184,10 @@ class MemberContact:
         self.edges = Edges(scene, self.closest, self.tolerance)
         self.across: Callable[[Prepared], tuple[Curve, Tangent]] | None = None
 
+    def hold(self, fixed: Collection[str]) -> None:
+        """Take the mesh of other members for prescribed."""
+        self.fixed = self.lines.fixed = fixed
+
     # -- begin ------------------------------------------------------------------------------------
 
     def refuse_penetrating(self, fields: Fields) -> None:
@@ -281,16 +285,14 @@ class MemberContact:
         With ``drag`` rotations since another state are resisted, see :class:`~sfetcas.solvers.pseudo_transient.Drag`.
         """
         numbered = self.lines.set_out(mesh, points)
-        if self.lines.keys and not self.scene.rubs:
-            pressing = self._pressing(mesh, numbered, source, way, since, drag)
-            if pressing is None and ends:
-                return None
-            numbered, source = pressing or (numbered, source)
         for _ in FIRM if self.scene.rubs and points else (1.0,):
-            set_up = self.gripping.set_up(source.fields, mesh, numbered)
-            found = self._corrected(replace(mesh, points=set_up), source, way, since, drag)
-            if found is not None:
-                return found
+            pressing = self._pressing(mesh, numbered, source, way, since, drag) if self.lines.keys else None
+            if pressing is not None or not (ends and self.lines.keys):
+                pushing, near = pressing or (numbered, source)
+                set_up = self.gripping.set_up(near.fields, mesh, pushing)
+                found = self._corrected(replace(mesh, points=set_up), near, way, since, drag)
+                if found is not None:
+                    return found
             self.gripping.change()
         return self._softly(mesh, numbered, source, way, since, drag) if self.scene.rubs and points else None
 
@@ -304,30 +306,60 @@ class MemberContact:
             return points, source
         for i in free:
             every[i] = self._known(every[i])
+        every = list(self.gripping.set_up(source.fields, mesh, every))
         prepared = self.prepare(replace(mesh, points=tuple(every)))
         prepared.equations.redundant = False
-        rows = {name: i for i, name in enumerate(prepared.model.row_names)}
-        pushing = np.array([rows[every[i].rows(prepared.model.element.axes)[-1]] for i in free])
+        pushing = self._gaps(prepared, [every[i] for i in free])
         # What presses on an element does so with both its forces, if only rounding chooses.
         halves = {self.lines.element_of(mesh, point) for point in points}
         acting = np.array([i < len(points) or self.lines.element_of(mesh, every[i]) in halves - {None} for i in free])
         resisting = None if since is None else self._drag(prepared, since, drag)
         loads, state = way(prepared.model), self.carried(source, prepared)
         border = None if self.across is None else bordered(*self.across(prepared))
-        system = OneSided(prepared.equations, loads, prepared.weight, None, None, resisting, pushing, acting, border)
-        limits = Limits(iterations=ITERATIONS if border is None else ACROSS, most=TURN, contraction=2.0)
-        with np.errstate(over="ignore", invalid="ignore"):
-            found = correct(system, state, factor=source.factor, limits=limits)
+        system = OneSided(
+            prepared.equations, loads, prepared.weight, None, None, resisting, pushing, acting.copy(), border=border
+        )
+        found = self._chosen(system, state, source.factor)
+        rubs = self._rubbing(prepared, every)
+        if not found.converged and len(rubs):
+            # From where friction has not changed yet.
+            known = replace(system, acting=acting, still=rubs, _tried={})
+            found = self._chosen(known, state, source.factor)
+            system = replace(known, still=system.still, _tried={})
+            found = self._chosen(system, found.state, found.loading.factor) if found.converged else found
         if not found.converged:
             return None
         # What pushes by rounding may as well not: on another processor it does not.
-        pushes = np.where(system.acting, -found.state.lam[pushing], 0.0)
+        pushes = np.where(system.acting, system.pushes(found.state), 0.0)
         acts = pushes > LASTING * pushes.max(initial=0.0)
         idle = {i for i, pushed in zip(free, acts.tolist(), strict=True) if not pushed}
         pressed = Solved(prepared, **found._asdict())
         # Where those that slide are now: from there their pushes go on.
         kept = [point for i, point in enumerate(points_of(pressed)) if i not in idle]
         return self.lines.set_out(mesh, kept), pressed
+
+    def _chosen(self, system: OneSided, state: State, factor: float) -> Converged:
+        """Newton's method from a near state."""
+        limits = Limits(iterations=ITERATIONS if self.across is None else ACROSS, most=TURN, contraction=2.0)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return correct(system, state, factor=factor, limits=limits)
+
+    @staticmethod
+    def _gaps(prepared: Prepared, points: Iterable[ContactPoint]) -> Index:
+        """Numbers of the gaps of points among all residuals; with friction of their pushes, which are unknowns."""
+        equations, model = prepared.equations, prepared.model
+        rows = {name: equations.unknowns + i for i, name in enumerate(model.row_names)}
+        forces = {name: equations.rotation_unknowns + i for i, name in enumerate(model.positions.unknowns)}
+        axes = model.element.axes
+        return np.array([forces[f"{p.pressed}, across"] if p.grip else rows[p.rows(axes)[-1]] for p in points])
+
+    @staticmethod
+    def _rubbing(prepared: Prepared, points: Iterable[ContactPoint]) -> Index:
+        """Numbers of the friction at points among all unknowns."""
+        first, places = prepared.equations.rotation_unknowns, {p.pressed for p in points if p.grip}
+        names = (name.rsplit(", ", 1) for name in prepared.model.positions.unknowns)
+        found = [first + i for i, (place, *way) in enumerate(names) if place in places and way != ["across"]]
+        return np.array(found, np.intp)
 
     def _known(self, point: ContactPoint) -> ContactPoint:
         """A point that stays where it is, the gap of which is measured where it is now."""
@@ -720,7 +752,9 @@ class MemberContact:
             self.patient = step > PATIENT
             there = self._next(mesh, now.solved, way(part))
             self.patient = False
-            begun = None if there is None else self.gripping.begins(there.model.mesh.points, TOUCHED * self.first)
+            # Along lines places begin to touch all the time, near to where they do.
+            single = [] if there is None else [p for p in there.model.mesh.points if p.pair not in self.lines.keys]
+            begun = self.gripping.begins(single, TOUCHED * self.first)
             if begun is not None:
                 # What begins to touch is where it was then: steps end there.
                 step = begun * (part - now.part)
@@ -819,6 +853,18 @@ class MemberContact:
                 break
             found = there
         return found
+
+    def ended(self, found: Solved, way: Way) -> Solved:
+        """The state at the end of a way with friction with the places where lines end for unknowns, if it is found."""
+        keys, self.lines.ending = self.lines.keys, self.lines.ends_within(found)
+        if not self.lines.ending:
+            return found
+        points = self.lines.halved(points_of(found))
+        there = self.resolved(replace(found.model.mesh, points=()), points, found, way)
+        near = there is not None and self.turned(found.fields, there.fields) < STRIDE
+        there = self.fitted(there, way) if there is not None and near else found
+        self.lines.keys, self.lines.ending = keys, frozenset()
+        return there
 
     def as_lines(self, found: Solved, way: Way, turned: float) -> Solved | None:
         """The state with the two ends of each short line that one point stood for; None where there is none.

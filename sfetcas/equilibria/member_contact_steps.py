@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import tolerances
 from ..contact.held_inside import refuse_held_inside
+from ..contact.lines import points_of
 from ..contact.member_contact import FITS, MemberContact
 from ..description.inserting import stops_between
 from ..description.scene import Scene
@@ -89,7 +90,10 @@ class MemberContactSteps:
             if alone is not None:
                 return alone
         notes: tuple[str, ...] = () if pilot.model.conservative else (NO_ENERGY,)
+        # On its way all divides as what touches asks for: on the mesh that is prescribed where lines end is known then.
+        self.run.hold(())
         found, more = self._reached(pilot, factor, zero)
+        self.run.hold(self.meshes.fixed)
         self.last = (factor, found)
         return self._refined(found, factor, (*notes, *more))
 
@@ -160,9 +164,10 @@ class MemberContactSteps:
         """The answer on a mesh that is fine enough for the accuracy."""
         target, accuracy = self.meshes.target, self.meshes.accuracy
         now = found
-        if now.model.mesh.order != target.order or self.meshes.fixed:
-            mesh = target if self.meshes.fixed else replace(now.model.mesh, order=target.order)
-            now = self._onto(mesh, now, factor)
+        if self.meshes.fixed:
+            now = self._onto(self.run.lines.fitted(target, points_of(now), prescribed=True)[0], now, factor)
+        elif now.model.mesh.order != target.order:
+            now = self._onto(replace(now.model.mesh, order=target.order), now, factor)
         smooth, error, run = np.sqrt(accuracy), np.inf, self.run
         for _ in range(LEVELS):
             # Elsewhere than at ends of elements forces on them would be taken for roughness.

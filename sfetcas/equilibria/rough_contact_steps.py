@@ -102,7 +102,7 @@ class RoughContactSteps:
             for a, b in itertools.pairwise(stops_between(self.scene, last, factor)):
                 now = self._known(run, run.follow(partial(on_way, a, b), now), a, b)
                 told += run.notes(a, b)
-            found.append(now)
+            found.append(run.ended(now, on_way(factor, factor, 1.0)))
             notes.append(told)
             last = factor
         return found, run, notes

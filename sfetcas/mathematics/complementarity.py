@@ -152,6 +152,9 @@ def _by_single_pivots(matrix: Array, b: Array) -> Array | None:
             return None
         ratios = table[able, -1] / column[able]
         least = able[ratios <= (1.0 + ROUNDING) * ratios.min() + ROUNDING * size]
+        if not len(least):
+            # Numbers that have grown beyond all bounds.
+            return None
         last = least[basis[least] == 2 * n]
         # Of equal ones the first in the order of words, which does not go round.
         words = table[least, :n] / column[least, None]

@@ -57,15 +57,19 @@ class OneSided(AtLoads):
     Attributes
     ----------
     pushing : ndarray (m,)
-        Numbers of these rows among all rows: their residual is a gap, their multiplier minus the push.
+        Their numbers among all residuals and unknowns: a gap and minus a push, which is a multiplier; or, where
+        friction has the push for an unknown, minus a gap and a push.
     acting : ndarray (m,) of bool
         Which of them act; kept up to date by :meth:`step`.
+    still : ndarray (k,)
+        Numbers of unknowns that stay as they are, as friction does that is not known yet.
     border : Border, optional
         Where the factor of the loads is an unknown.
     """
 
     pushing: Index = field(default_factory=lambda: np.zeros(0, np.intp))
     acting: Array = field(default_factory=lambda: np.zeros(0, bool))
+    still: Index = field(default_factory=lambda: np.zeros(0, np.intp))
     border: Border | None = None
     _tried: dict[bytes, int] = field(default_factory=dict)
 
@@ -73,27 +77,41 @@ class OneSided(AtLoads):
         """The given loads, or those at the factor where that is an unknown."""
         return self.loads if self.border is None else self.border.loading(factor)
 
+    @property
+    def _signs(self) -> Array:
+        """Of pushes 1, of multipliers -1, and with the opposite sign of residuals: (m,)."""
+        return np.where(self.pushing < self.equations.unknowns, 1.0, -1.0)
+
+    def pushes(self, state: State) -> Array:
+        """The pushes (m,) in a state."""
+        values = np.concatenate([state.y, state.lam])
+        return np.asarray(self._signs * values[self.pushing - self.equations.rotation_unknowns])
+
     def seen(self, state: State, point: Point) -> Point:
         """The equations with pulls of rows that act, and gaps of those that do not where they are below zero."""
         seen = super().seen(state, point)
-        residual, rows = seen.residual.copy(), self.equations.unknowns + self.pushing
-        forces = state.lam[self.pushing]
-        pulls = np.where(forces > ROUNDING * np.abs(forces).max(initial=0.0), forces, 0.0)
-        residual[rows] = np.where(self.acting, np.hypot(residual[rows], pulls), np.minimum(residual[rows], 0.0))
+        residual, rows, pulls = seen.residual.copy(), self.pushing, -self.pushes(state)
+        pulls = np.where(pulls > ROUNDING * np.abs(pulls).max(initial=0.0), pulls, 0.0)
+        gaps = -self._signs * residual[rows]
+        residual[rows] = np.where(self.acting, np.hypot(gaps, pulls), np.minimum(gaps, 0.0))
+        residual[self.still] = 0.0
         return replace(seen, residual=residual)
 
     def step(self, here: Balance) -> Array:
         """Newton's step, dimensionless, to the rows that act then: (total,), or (total + 1,) with the factor last."""
-        equations, rows, forces = self.equations, self.equations.unknowns + self.pushing, here.state.lam[self.pushing]
+        equations, rows, signs, forces = self.equations, self.pushing, self._signs, self.pushes(here.state)
         point = super().seen(here.state, here.plain)
+        point = replace(point, residual=point.residual.copy())
+        point.residual[self.still] = 0.0
         slope = np.zeros(equations.total)
         if self.border is not None:
             slope = self.border.slope(here.state, here.loading.factor, point)
         moved, factor = self._moved(point, rows, slope)
         # Pushes of rows that act, gaps of those that do not.
-        gaps, pushes = _times(equations, point.entries, moved, rows) + np.outer(slope[rows], factor), -moved[rows]
+        gaps = _times(equations, point.entries, moved, rows) + np.outer(slope[rows], factor)
         gaps[:, 0] += point.residual[rows]
-        pushes[:, 0] -= forces
+        gaps, pushes = -signs[:, None] * gaps, signs[:, None] * moved[rows]
+        pushes[:, 0] += forces
         basic = np.where(self.acting[:, None], pushes, gaps)
         found = by_pivots(basic[:, 1:], basic[:, 0])
         if found is None:
@@ -104,7 +122,7 @@ class OneSided(AtLoads):
             self._tried[chosen] = self._tried.get(chosen, 0) + 1
         shares = np.append(1.0, found)
         step = moved @ shares
-        step[rows[~self.acting]] = -forces[~self.acting]
+        step[rows[~self.acting]] = -(signs * forces)[~self.acting]
         return self._with_factor(step, factor @ shares)
 
     def _with_factor(self, step: Array, factor: float) -> Array:
@@ -119,16 +137,20 @@ class OneSided(AtLoads):
         idle = np.zeros(equations.total, bool)
         idle[rows[~self.acting]] = True
         entries = np.where(idle[equations.row] | idle[equations.column], 0.0, point.entries)
-        entries[equations.diagonal[rows[~self.acting]]] = -1.0
+        kept = np.zeros(equations.total, bool)
+        kept[self.still] = True
+        entries[kept[equations.row]] = 0.0
+        entries[equations.diagonal[np.append(rows[~self.acting], self.still)]] = -1.0
         equations.solver.factor(equations.regularised(entries, tolerances.PROXIMAL * self.weight, tolerances.DUAL))
         right = np.zeros((equations.total, 2 + len(rows)))
         right[:, 0], right[:, -1] = np.where(idle, 0.0, -point.residual), np.where(idle, 0.0, -slope)
         for k, row in enumerate(rows.tolist(), 1):
             if idle[row]:
                 mine = (equations.column == row) & ~idle[equations.row]
-                right[equations.row[mine], k] = point.entries[mine]
+                mine &= ~kept[equations.row]
+                right[equations.row[mine], k] = -self._signs[k - 1] * point.entries[mine]
             else:
-                right[row, k] = 1.0
+                right[row, k] = -self._signs[k - 1]
         moved = equations.solver.solve(right)
         moved, rate = moved[:, :-1], moved[:, -1]
         if self.border is None:
