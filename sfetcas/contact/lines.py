@@ -52,7 +52,7 @@ ASIDE, AHEAD = 4e-6, 0.2
 
 NEXT = 1e-2
 """Length of an element on a line, over the unit of length, of which no halves are made: how far forces at its ends bend
-it goes with its cube, so that rounding of gaps leaves a share of 1e-10 of them open here, and 1e-4 in a hundredth of it.
+it goes with its cube: rounding of gaps leaves a share of 1e-10 of these open here, and 1e-4 in a hundredth of it.
 """
 
 MOSTLY = 0.9
