@@ -580,17 +580,6 @@ def test_plane_may_be_given_by_its_other_normal():
     np.testing.assert_allclose(other.normal, [0, 1, 0])
 
 
-@pytest.mark.parametrize(
-    ("analysis", "sentence"),
-    [
-        ({"equilibria": "all"}, r"^analysis\.equilibria: found 'all' with contacts"),
-    ],
-)
-def test_searches_that_know_no_contact_are_refused(analysis, sentence):
-    with pytest.raises(SceneError, match=sentence):
-        made(above(0.2, loads=weight(3), analysis=analysis))
-
-
 # -- ways to a state in contact -------------------------------------------------------------------------
 
 

@@ -77,6 +77,9 @@ NARROW = 1e-3
 BEHIND_EDGE = 0.2
 """Distance behind an edge from which a member is not in contact with it, share of the size of the scene."""
 
+LEFT = 1e-3
+"""Share of the distance of what is round, or of two members, that is left where these are drawn back."""
+
 LYING, SAMPLES = (1e-8, 1e-6), 7
 """Shares of the size of the scene between which that is up to which a gap between touches is none, and number of places
 where it is seen.
@@ -163,6 +166,14 @@ class Pair:
         """Whether members may have passed each other or the obstacle: what is beyond a plane is inside of it."""
         return self.stop is None or (self.stop.kind == "round" and self.stop.sign > 0.0)
 
+    def drawn_back(self, by: float) -> Pair:
+        """The same where surfaces are drawn back by a length, m: members are on one side of what is round as before.
+
+        An edge, which has no inside, stays.
+        """
+        most = 0.0 if self.edge else (1.0 - LEFT) * self.distance if self.passable else np.inf
+        return replace(self, distance=self.distance - min(by, most))
+
     @property
     def normal(self) -> tuple[float, float, float] | None:
         """The direction along which the distance is always measured; None where that is another one at each place."""
@@ -195,7 +206,7 @@ class Closest:
                     pairs.append(Pair(name, (a, b), radii[a] + radii[b], radii[a] + radii[b]))
             else:
                 pairs += [self._against(name, member) for member in names]
-        self.pairs = {pair.key: pair for pair in pairs}
+        self.pairs = self._given = {pair.key: pair for pair in pairs}
         self.sides = {pair.key: pair.edge for pair in pairs if pair.edge}
         # A state is looked at as the end of a step, and as the begin of another one.
         self._passing = weakref.WeakKeyDictionary[Fields, dict[PairKey, tuple[Array, Array, Array]]]()
@@ -219,6 +230,15 @@ class Closest:
         line = scene.center_lines[member]
         edge = edge_side(stop, line.positions, line.tangents) if stop.kind == "sharp" else 0.0
         return Pair(name, (member,), radius + stop.sign * stop.radius, width, stop, (first, last), edge)
+
+    def draw_back(self, by: float) -> None:
+        """Draw back the surfaces of all obstacles and members from where they are by a length, m."""
+        self.pairs = {key: pair.drawn_back(by) for key, pair in self._given.items()} if by else self._given
+
+    def back(self, point: ContactPoint) -> float:
+        """How far the surfaces of a point are drawn back, m, from where the model has them."""
+        given = point.distance if point.line else self._given[point.pair].distance
+        return given - self.pairs[point.pair].distance
 
     def stiff(self, member: str) -> bool:
         """Whether a member is straight, and stays so."""

@@ -22,7 +22,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array, Index, numbers, unit
 from ..mechanics.accuracy import roughness
 from ..mechanics.contact_points import undeformed_vectors
-from ..mechanics.equations import State
+from ..mechanics.equations import Point, State
 from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import ContactPoint, Mesh
@@ -40,7 +40,7 @@ from .edges import Edges
 from .gripping import FIRM, Gripping, Placed
 from .lines import LINE, SHORT_LINE, Lines, Points, begun, ends_of, points_of
 
-__all__ = ["FITS", "MemberContact"]
+__all__ = ["FITS", "MemberContact", "Way"]
 
 Way = Callable[[Model], Loading]
 """The loading of a model."""
@@ -313,7 +313,7 @@ class MemberContact:
         # What presses on an element does so with both its forces, if only rounding chooses.
         halves = {self.lines.element_of(mesh, point) for point in points}
         acting = np.array([i < len(points) or self.lines.element_of(mesh, every[i]) in halves - {None} for i in free])
-        resisting = None if since is None else self._drag(prepared, since, drag)
+        resisting = self._added(prepared, since, drag)
         loads, state = way(prepared.model), self.carried(source, prepared)
         border = None if self.across is None else bordered(*self.across(prepared))
         system = OneSided(
@@ -390,9 +390,7 @@ class MemberContact:
         state = self.carried(source, prepared)
         # Seen without contact, whose rows depend on others only nearly, where places are beside each other.
         prepared.equations.redundant = self.redundant
-        resisting = None
-        if since is not None:
-            resisting = self._drag(prepared, since, drag)
+        resisting = self._added(prepared, since, drag)
         # What is lost may overflow before it is told to be.
         with np.errstate(over="ignore", invalid="ignore"):
             if self.across is not None:
@@ -402,7 +400,26 @@ class MemberContact:
         good = found.converged or found.residual <= tolerances.BALANCED
         return found if good else None
 
-    def _drag(self, prepared: Prepared, since: Solved, size: float) -> Drag:
+    def _added(self, prepared: Prepared, since: Solved | None, drag: float) -> Callable[[State, Point], Point] | None:
+        """What the equations have beside those of the model: drag, and gaps of surfaces that are drawn back."""
+        resisting = None if since is None else self.drag(prepared, since, drag)
+        model = prepared.model
+        back = np.array([self.closest.back(point) for point in model.mesh.points]) / model.scales.length
+        if not back.any():
+            return resisting
+        number = {name: i for i, name in enumerate(model.row_names)}
+        gaps = [number[point.rows(model.element.axes)[-1]] for point in model.mesh.points]
+        rows = prepared.equations.unknowns + np.array(gaps, np.intp)
+
+        def added(state: State, point: Point) -> Point:
+            residual = point.residual.copy()
+            residual[rows] += back
+            point = replace(point, residual=residual)
+            return point if resisting is None else resisting(state, point)
+
+        return added
+
+    def drag(self, prepared: Prepared, since: Solved, size: float) -> Drag:
         """What resists all rotations, and displacements of nodes that are unknowns."""
         model, scene, moved = prepared.model, self.scene, list[int]()
         there = transferred(since.model, since.state, model)
@@ -875,9 +892,12 @@ class MemberContact:
         there = None if parted is None else self.resolved(*parted[:2], found, way)
         return None if there is None or self.turned(found.fields, there.fields) > STRIDE else there
 
-    def fallen(self, mesh: Mesh, found: Solved, way: Way) -> Solved | None:
-        """Where an unstable state falls to through something viscous; None where it does not come to rest."""
-        return self.relaxed(mesh, self._nudged(found), way, max(-found.stability.smallest, 0.0))
+    def fallen(self, mesh: Mesh, found: Solved, way: Way, side: int = 0) -> Solved | None:
+        """Where an unstable state falls to through something viscous; None where it does not come to rest.
+
+        ``side`` is the sign of the unstable mode along which it falls, zero for that of lower energy.
+        """
+        return self.relaxed(mesh, self._nudged(found, side), way, max(-found.stability.smallest, 0.0))
 
     def relaxed(self, mesh: Mesh, now: Solved, way: Way, deep: float = 0.0) -> Solved | None:
         """Where a state that is none of rest comes to rest in something viscous; None where it does not.
@@ -919,13 +939,13 @@ class MemberContact:
         return self.fallen(mesh, found, way) if self.falls <= MOST_FALLS else None
 
     @staticmethod
-    def _nudged(found: Solved) -> Solved:
-        """An unstable state moved along its unstable mode.
+    def _nudged(found: Solved, side: int = 0) -> Solved:
+        """An unstable state moved along its unstable mode, to a side as of :meth:`fallen`.
 
         Where points are on members is no part of that: they are where members are nearest.
         """
         prepared, loading = found.prepared, found.loading
-        state = prepared.nudged(found, loading, NUDGE)
+        state = prepared.beside(found, loading, side * NUDGE) if side else prepared.nudged(found, loading, NUDGE)
         slides = {f"{p.place(side)}, arc length" for p in found.model.mesh.points for side in range(len(p.members))}
         still = np.array([name in slides for name in found.model.positions.unknowns], dtype=bool)
         state = replace(state, y=np.where(still, found.state.y, state.y))

@@ -963,9 +963,10 @@ def _check_contacts(scene: Scene) -> None:
         for name, tendon in scene.tendons.items():
             if tendon.may_be_slack:
                 raise SceneError(f"found one that may be slack {accepted}, or pushes = true", ("tendons", name))
-    if scene.contacts and scene.analysis.equilibria == "all":
-        message = "found 'all' with contacts, accepted: 'one'; a node's 'start' chooses among several"
-        raise SceneError(message, ("analysis", "equilibria"))
+    if scene.rubs and scene.analysis.equilibria == "all":
+        rough = next(name for name, contact in scene.contacts.items() if contact.friction)
+        message = f"found 'all' with contacts.{rough}.friction, accepted: 'one', as what slides depends on the order"
+        raise SceneError(f"{message} of steps, and where it sticks equilibria are continua", ("analysis", "equilibria"))
     uneven = [name for name, field in scene.fields.items() if not field.uniform]
     if scene.contacts and uneven:
         message = "found a field with a gradient and contacts, accepted: a uniform field, or no contacts"

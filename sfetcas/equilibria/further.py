@@ -16,7 +16,7 @@ from .scanning import Scan, scan
 from .several import Search, long_elements, same, search
 from .solution import Equilibrium
 
-__all__ = ["FurtherEquilibria"]
+__all__ = ["FurtherEquilibria", "refuse_unsearched"]
 
 FINER = 2
 """How often the mesh of a scan is halved, at most, where it lacks equilibria that the scan counted."""
@@ -41,7 +41,7 @@ class FurtherEquilibria:
     def __init__(self, meshes: Meshing, refinement: Refinement, model: Model) -> None:
         self.meshes, self.refinement = meshes, refinement
         self.others: list[tuple[Model, State]] = []
-        self._refuse(model)
+        refuse_unsearched(meshes, model)
 
     def answers(self, found: EquilibriumResult, answer: Equilibrium) -> list[Equilibrium]:
         """The answer with a note about the search, then the further equilibria of its load factor by rising energy."""
@@ -60,26 +60,6 @@ class FurtherEquilibria:
             note += f"; {coarse} of the mesh of the search not found on finer ones"
         answers[0] = replace(answers[0], notes=(*answers[0].notes, note))
         return [answers[0], *sorted(answers[1:], key=lambda other: other.potential)]
-
-    def _refuse(self, model: Model) -> None:
-        """Refuse to search under loads whose energy is not there, or not known, or to the accuracy of a quantity.
-
-        Raises
-        ------
-        SceneError
-            Such loads, or such an accuracy.
-        """
-        if self.meshes.quantity is not None:
-            why = "equilibria are told apart by the error of their positions"
-            raise SceneError(
-                f"found {self.meshes.quantity.text!r}, accepted with all equilibria: none, as {why}", WHERE
-            )
-        if model.has_potential:
-            return
-        why = "loads without potential have no energy to search by"
-        if model.conservative:
-            why = "the energy of pressure, by which equilibria are sorted and told apart, is not evaluated"
-        raise SceneError(f"found 'all', accepted: 'one', as {why}", ("analysis", "equilibria"))
 
     def _further(self, candidate: EquilibriumResult) -> Equilibrium | None:
         """The answer to what a search found; None where finer meshes do not have it."""
@@ -121,3 +101,22 @@ class FurtherEquilibria:
         result = scanned or search(begin, starts, self.meshes.settings.runs)
         self.others = [(other.model, other.state) for other in result.found]
         return result
+
+
+def refuse_unsearched(meshes: Meshing, model: Model) -> None:
+    """Refuse to search under loads whose energy is not there, or not known, or to the accuracy of a quantity.
+
+    Raises
+    ------
+    SceneError
+        Such loads, or such an accuracy.
+    """
+    if meshes.quantity is not None:
+        why = "equilibria are told apart by the error of their positions"
+        raise SceneError(f"found {meshes.quantity.text!r}, accepted with all equilibria: none, as {why}", WHERE)
+    if model.has_potential:
+        return
+    why = "loads without potential have no energy to search by"
+    if model.conservative:
+        why = "the energy of pressure, by which equilibria are sorted and told apart, is not evaluated"
+    raise SceneError(f"found 'all', accepted: 'one', as {why}", ("analysis", "equilibria"))

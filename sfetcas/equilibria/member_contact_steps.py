@@ -61,11 +61,15 @@ class MemberContactSteps:
     ----------
     meshes, ways, refinement
         Of the scene, see :class:`~sfetcas.equilibria.statics.LoadSteps`.
+    kept : bool
+        Whether an equilibrium is not to be replaced by another one, as that to which an unstable one falls.
     """
 
-    def __init__(self, meshes: Meshing, ways: Ways, refinement: Refinement) -> None:
+    def __init__(self, meshes: Meshing, ways: Ways, refinement: Refinement, *, kept: bool = False) -> None:
         self.meshes, self.ways, self.refinement, self.scene = meshes, ways, refinement, meshes.scene
         self.run = MemberContact(self.scene, meshes.prepared, meshes.accuracy, meshes.fixed)
+        self.run.leaves &= not kept
+        self.kept = kept
         self.last: tuple[float, Solved] | None = None
         self.checked = False
         self.moved: set[float] = set()
@@ -95,7 +99,7 @@ class MemberContactSteps:
         found, more = self._reached(pilot, factor, zero)
         self.run.hold(self.meshes.fixed)
         self.last = (factor, found)
-        return self._refined(found, factor, (*notes, *more))
+        return self.refined(found, factor, (*notes, *more))
 
     def _begun(self, pilot: Prepared, factor: float, zero: Solved) -> Solved | None:
         """Where a small share of the loads puts what has no place without loads; None where that is not near."""
@@ -160,8 +164,14 @@ class MemberContactSteps:
 
     # -- accuracy -------------------------------------------------------------------------------
 
-    def _refined(self, found: Solved, factor: float, notes: tuple[str, ...]) -> Equilibrium:
-        """The answer on a mesh that is fine enough for the accuracy."""
+    def refined(self, found: Solved, factor: float, notes: tuple[str, ...]) -> Equilibrium:
+        """The answer on a mesh that is fine enough for the accuracy.
+
+        Raises
+        ------
+        SolveError
+            What touches is not found on finer meshes, or forces are lost.
+        """
         target, accuracy = self.meshes.target, self.meshes.accuracy
         now = found
         if self.meshes.fixed:
@@ -203,7 +213,7 @@ class MemberContactSteps:
         if run.unstable(now, lambda model: model.loading(factor)) and LEFT not in notes:
             rest = run.fallen(replace(now.model.mesh, points=()), now, lambda model: model.loading(factor))
             if rest is not None:
-                return self._refined(rest, factor, (*notes, LEFT))
+                return self.refined(rest, factor, (*notes, LEFT))
         if factor in self.moved and LEFT not in notes:
             notes = (*notes, LEFT)
         stability = run.rolling(now, lambda model: model.loading(factor)).stability
@@ -227,7 +237,7 @@ class MemberContactSteps:
         mesh, run = replace(mesh, points=()), self.run
         there = run.resolved(mesh, run.lines.points_on(mesh, found), found, lambda model: model.loading(factor))
         if there is None or run.turned(found.fields, there.fields) > NEAR:
-            there = run.relaxed(mesh, found, lambda model: model.loading(factor))
+            there = None if self.kept else run.relaxed(mesh, found, lambda model: model.loading(factor))
             if there is not None and run.turned(found.fields, there.fields) > NEAR:
                 self.moved.add(factor)
         if there is None:

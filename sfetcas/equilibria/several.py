@@ -32,7 +32,7 @@ from ..solvers.prepared import Prepared, Solved
 from .mirrors import Mirror, mirrored, mirrors
 from .solution import Equilibrium
 
-__all__ = ["Search", "alike", "long_elements", "missing", "same", "search"]
+__all__ = ["Search", "Waiting", "alike", "long_elements", "missing", "same", "search"]
 
 RUNS, FEWEST_RUNS, EFFORT = 300, 60, 40_000
 """Newton runs at most by default, fewer (but some) where runs times unknowns, twice in space, are more."""
@@ -76,6 +76,10 @@ KINDS = ("carried", "returned", "given", "mirrored", "downhill", "nudged", "bent
 """Kinds of starts in the order of what they bring for their cost (measured)."""
 
 
+Waiting = dict[str, deque[tuple[Callable[[], State], bool]]]
+"""For each kind the starts still to be tried, with deflation or without."""
+
+
 @dataclass(eq=False)
 class Search:
     """A search for several equilibria under the same loads, with its results and its statistics.
@@ -109,9 +113,7 @@ class Search:
     family: set[int] = field(default_factory=set)
     exhausted: bool = False
     smaller: int = 0
-    waiting: dict[str, deque[tuple[Callable[[], State], bool]]] = field(
-        default_factory=lambda: {kind: deque() for kind in KINDS}
-    )
+    waiting: Waiting = field(default_factory=lambda: {kind: deque() for kind in KINDS})
 
     def sentence(self) -> str:
         """A sentence on what the search did, for the notes of the answer."""
@@ -119,9 +121,13 @@ class Search:
         end = "stopped at its largest number of runs" if self.exhausted else "went through all its starts"
         return (
             f"searched by {counted(self.total, 'Newton run')}, {self.deflated} of them deflated ({kinds}), of which "
-            f"{self.arrived} arrived, after {self.smaller} under smaller loads; the search {end}; there may be more "
-            "equilibria"
+            f"{self.arrived} arrived, {self.before}; the search {end}; there may be more equilibria"
         )
+
+    @property
+    def before(self) -> str:
+        """What was done before, in words."""
+        return f"after {self.smaller} under smaller loads"
 
     def family_note(self, number: int) -> tuple[str, ...]:
         """Notes for an equilibrium that stands for a continuous family; empty for others."""
@@ -137,8 +143,7 @@ class Search:
         """Run Newton's method from a start, with or without deflation; True where it finds a new equilibrium."""
         self.counts[kind] = self.counts.get(kind, 0) + 1
         self.deflated += deflate
-        there = deflated(self.prepared, start, self.loading, [f.state for f in self.found] if deflate else ())
-        there = there and self._unwrapped_back(there)
+        there = self._arrived(start, [f.state for f in self.found] if deflate else ())
         if there is None:
             return False
         self.arrived += 1
@@ -146,6 +151,15 @@ class Search:
             return False
         self.found.append(there)
         return True
+
+    def _arrived(self, start: State, known: Sequence[State]) -> Solved | None:
+        """Where a run from a start leads that is kept away from known states; None where it does not converge."""
+        there = deflated(self.prepared, start, self.loading, known)
+        return there and self._unwrapped_back(there)
+
+    def held(self, found: Solved) -> Solved:
+        """The same with all that holds it as rows, for its stability: here itself."""
+        return found
 
     def _unwrapped_back(self, there: Solved) -> Solved:
         """The same without whole turns of parts that nothing holds."""
@@ -188,6 +202,7 @@ class Search:
         return False
 
     def _neutral(self, there: Solved) -> bool:
+        there = self.held(there)
         if self.prepared.equations.rotation_unknowns > LARGE:
             return there.stability.stable == "neutral"
         return bool((there.spectrum(0)[0] == 0.0).any())
@@ -217,12 +232,13 @@ class Search:
     def _mirrored(self, state: State, image: Mirror) -> State:
         return self.closed(mirrored(self.prepared.model, state, image))
 
-    def _downhill(self, state: State, shape: Array) -> State:
-        """Where the energy falls to from the state moved along a shape."""
-        prepared = self.prepared
-        return descend(prepared.equations, self.moved(state, shape), self.loading, prepared.weight, iterations=DESCENT)
+    def _downhill(self, found: Solved, shape: Array) -> State:
+        """Where the energy falls to from an unstable equilibrium moved along a shape."""
+        equations, begin = self.prepared.equations, self.moved(found.state, shape)
+        return descend(equations, begin, self.loading, self.prepared.weight, iterations=DESCENT)
 
     def _shapes(self, found: Solved, count: int) -> Array:
+        found = self.held(found)
         if self.prepared.equations.rotation_unknowns > LARGE:
             return found.stability.shape[None, :]
         return found.spectrum(count)[1]
@@ -245,8 +261,8 @@ class Search:
         for image in self.images:
             self.offer("mirrored", partial(self._mirrored, state, image), deflate=False)
         shapes = self._shapes(found, SHAPES)
-        if found.negative:
-            sides = (partial(self._downhill, state, size * shapes[0]) for size in (DOWN, -DOWN))
+        if self.held(found).negative:
+            sides = (partial(self._downhill, found, size * shapes[0]) for size in (DOWN, -DOWN))
             self.offer("downhill", *sides, deflate=False)
         for kind, size in (("nudged", NUDGE), ("farther", FARTHER_NUDGE)):
             sides = (partial(self.moved, state, way * shape) for shape in shapes for way in (size, -size))

@@ -28,6 +28,7 @@ from .ways import Ways
 if TYPE_CHECKING:
     from .further import FurtherEquilibria
     from .member_contact_steps import MemberContactSteps
+    from .several_in_contact import SeveralInContact
 
 __all__ = ["LoadSteps", "Settings", "pilot_of", "solve", "solve_model"]
 
@@ -102,6 +103,7 @@ class LoadSteps:
         if self.scene.rubs:
             return self._rubbed(pilot, begin)
         further, contact = self._further(pilot), self._contact()
+        touching = self._several_in_contact(pilot)
         steps: list[Equilibrium] = []
         last: tuple[float, EquilibriumResult] | None = None
         for factor in self.scene.analysis.steps:
@@ -109,6 +111,8 @@ class LoadSteps:
             try:
                 if contact is not None:
                     steps.append(contact.answer(pilot, factor))
+                    if touching is not None:
+                        steps[-1:] = touching.answers(steps[-1], contact.run)
                     continue
                 found = self.ways.result(pilot, factor, last)
                 last = (factor, found) if found.solved.prepared is pilot else None
@@ -155,7 +159,7 @@ class LoadSteps:
 
     def _further(self, pilot: Prepared) -> FurtherEquilibria | None:
         """The search for all equilibria, where the scene asks for it."""
-        if self.scene.analysis.equilibria != "all":
+        if self.scene.analysis.equilibria != "all" or self.scene.contacts:
             return None
         from .further import FurtherEquilibria
 
@@ -168,3 +172,11 @@ class LoadSteps:
         from .member_contact_steps import MemberContactSteps
 
         return MemberContactSteps(self.meshes, self.ways, self.refinement)
+
+    def _several_in_contact(self, pilot: Prepared) -> SeveralInContact | None:
+        """The search for all equilibria of a scene with contact, where it asks for it."""
+        if self.scene.analysis.equilibria != "all" or not self.scene.contacts:
+            return None
+        from .several_in_contact import SeveralInContact
+
+        return SeveralInContact(self.meshes, self.ways, self.refinement, pilot.model)

@@ -10,7 +10,7 @@ Source: Farrell, Birkisson and Funke 2015, SIAM J. Sci. Comput. 37, A2026 (shift
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from .. import tolerances
@@ -36,28 +36,55 @@ ITERATIONS = 40
 """Iterations of a run: those that arrive at something new need 5 to 35 (measured)."""
 
 
-def deflated(prepared: Prepared, state: State, loading: Loading, known: Sequence[State]) -> Solved | None:
-    """An equilibrium by Newton's method from a state, kept away from the known states; None without convergence."""
+def deflated(
+    prepared: Prepared,
+    state: State,
+    loading: Loading,
+    known: Sequence[State],
+    *,
+    step: Callable[[Iterate], Array] | None = None,
+    correct: Callable[[State], Solved] | None = None,
+    least: int = 0,
+) -> Solved | None:
+    """An equilibrium by Newton's method from a state, kept away from the known states; None without convergence.
+
+    Parameters
+    ----------
+    prepared, state, loading
+        As of :meth:`.Prepared.correct`.
+    known : sequence of State
+        On the same mesh.
+    step : callable, optional
+        Iterate -> step (total,), by default Newton's.
+    correct : callable, optional
+        What converges from a near state, by default :meth:`.Prepared.correct`.
+    least : int
+        Steps at least.
+    """
     equations = prepared.equations
     moving = Moving(equations, loading)
-
-    def step(here: Iterate) -> Array:
-        return newton_step(equations, here.point, prepared.weight)
+    correct = correct or (lambda near: prepared.correct(near, loading))
 
     def after(here: Iterate, step: Array) -> Iterate:
         length = largest_rotation(equations, step)
-        if length < UNDEFLATED:
+        if length < UNDEFLATED and here.count >= least:
             return replace(here, length=length)
         # The step of the deflated equations points along the plain one, forwards or backwards.
         turned = step[: equations.rotation_unknowns]
         left = 1.0 - sum(_slope(equations, here.state, other, turned) for other in known)
         stretch = min(1.0 / max(abs(left), 1e-12), LONGEST / length)
         state = equations.moved(here.state, (stretch if left > 0.0 else -stretch) * step)
-        return moving.at(state)
+        return replace(moving.at(state), count=here.count + 1)
 
     begin = moving.at(equations.holding(state, loading))
-    near, arrived = newton(begin, step, after, lambda here: here.length < UNDEFLATED, ITERATIONS)
-    found = prepared.correct(near.state, loading) if arrived else None
+    near, arrived = newton(
+        begin,
+        step or (lambda here: newton_step(equations, here.point, prepared.weight)),
+        after,
+        lambda here: here.length < UNDEFLATED and here.count >= least,
+        ITERATIONS + least,
+    )
+    found = correct(near.state) if arrived else None
     return found if found is not None and found.converged else None
 
 

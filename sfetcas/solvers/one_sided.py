@@ -144,13 +144,12 @@ class OneSided(AtLoads):
         equations.solver.factor(equations.regularised(entries, tolerances.PROXIMAL * self.weight, tolerances.DUAL))
         right = np.zeros((equations.total, 2 + len(rows)))
         right[:, 0], right[:, -1] = np.where(idle, 0.0, -point.residual), np.where(idle, 0.0, -slope)
-        for k, row in enumerate(rows.tolist(), 1):
-            if idle[row]:
-                mine = (equations.column == row) & ~idle[equations.row]
-                mine &= ~kept[equations.row]
-                right[equations.row[mine], k] = -self._signs[k - 1] * point.entries[mine]
-            else:
-                right[row, k] = -self._signs[k - 1]
+        number = np.zeros(equations.total, np.intp)
+        number[rows] = np.arange(1, len(rows) + 1)
+        right[rows[self.acting], number[rows[self.acting]]] = -self._signs[self.acting]
+        mine = idle[equations.column] & ~(idle | kept)[equations.row]
+        column = number[equations.column[mine]]
+        right[equations.row[mine], column] = -self._signs[column - 1] * point.entries[mine]
         moved = equations.solver.solve(right)
         moved, rate = moved[:, :-1], moved[:, -1]
         if self.border is None:

@@ -32,7 +32,7 @@ from .guess import first_guess, lacks_slack, restore
 from .newton import AtLoads, Limits, correct
 from .problem import EquilibriumProblem
 from .program import Program
-from .pseudo_transient import Drag, flow
+from .pseudo_transient import flow
 from .redundancy import loose_rows, stretched
 from .sharing import shared
 from .stability import Inertia, Stability, StabilityTest
@@ -157,7 +157,7 @@ class Prepared:
         *,
         tangent: Array | None = None,
         flat: Array | None = None,
-        drag: Drag | None = None,
+        drag: Callable[[State, Point], Point] | None = None,
         **limits: Any,
     ) -> Solved:
         """Newton's method from a near state to the equilibrium under a loading.
@@ -371,16 +371,11 @@ class Prepared:
 
         ``amplitude`` is the largest rotation, rad; its sign chooses the side where energies are equal or not computed.
         """
-        equations, state, stability = self.equations, found.state, found.stability
-        sides = []
-        for sign in (1.0, -1.0):
-            step = np.zeros(equations.total)
-            step[: equations.rotation_unknowns] = sign * amplitude * stability.shape
-            step[equations.rotation_unknowns : equations.unknowns] = sign * amplitude * stability.travel
-            moved = replace(equations.moved(state, step), lam=state.lam)
-            if equations.rows:
-                moved = replace(restore(equations, moved, loading, self._test.weight)[0], lam=state.lam)
-            sides.append((equations.at(moved, loading), moved))
+        equations = self.equations
+        sides = [
+            (equations.at(moved, loading), moved)
+            for moved in (self.beside(found, loading, sign * amplitude) for sign in (1.0, -1.0))
+        ]
         # A symmetric pair differs by rounding only: then the first side, so that answers repeat.  Loads that follow
         # are not in the potential: from an unstable state both sides go down.
         (up, first), (down, second) = sides
@@ -389,6 +384,19 @@ class Prepared:
         # Near a bifurcation the work of the load and the strain energy nearly cancel: strain gives the size as well.
         size = max(abs(up.potential), abs(down.potential), up.strain, down.strain)
         return second if up.potential - down.potential > tolerances.LEVEL * size else first
+
+    def beside(self, found: Solved, loading: Loading, amplitude: float) -> State:
+        """A state displaced along its unstable mode by a largest rotation, rad, to the side of its sign, with its gaps
+        closed again.
+        """
+        equations, state, stability = self.equations, found.state, found.stability
+        step = np.zeros(equations.total)
+        step[: equations.rotation_unknowns] = amplitude * stability.shape
+        step[equations.rotation_unknowns : equations.unknowns] = amplitude * stability.travel
+        moved = replace(equations.moved(state, step), lam=state.lam)
+        if equations.rows:
+            moved = replace(restore(equations, moved, loading, self._test.weight)[0], lam=state.lam)
+        return moved
 
     @functools.cached_property
     def load_size(self) -> float:
