@@ -32,7 +32,7 @@ from ..solvers.prepared import Prepared, Solved
 from .mirrors import Mirror, mirrored, mirrors
 from .solution import Equilibrium
 
-__all__ = ["Search", "Waiting", "alike", "long_elements", "missing", "same", "search"]
+__all__ = ["Search", "Waiting", "alike", "long_elements", "missing", "same", "search", "wound"]
 
 RUNS, FEWEST_RUNS, EFFORT = 300, 60, 40_000
 """Newton runs at most by default, fewer (but some) where runs times unknowns, twice in space, are more."""
@@ -71,6 +71,9 @@ DESCENT = 60
 
 BEYOND = (3.162, 10.0, -1.0, -10.0)
 """Shares of the loads from which states come back: larger ones snap, reversed ones snap to the other side."""
+
+WOUND = 0.05
+"""Share of elastic energies by which those differ that whole turns are in: errors of places make far less."""
 
 KINDS = ("carried", "returned", "given", "mirrored", "downhill", "nudged", "bent", "half-way", "farther")
 """Kinds of starts in the order of what they bring for their cost (measured)."""
@@ -396,7 +399,13 @@ def same(one: Equilibrium, other: Equilibrium) -> bool:
 def alike(one: Equilibrium, other: Equilibrium) -> bool:
     """Whether two answers, on any meshes, agree within their estimated errors."""
     errors = (one.certificate.error_estimate or 0.0) + (other.certificate.error_estimate or 0.0)
-    return largest_difference(one.fields, other.fields) <= 2.0 * errors + 1e-9
+    apart = largest_difference(one.fields, other.fields)
+    return apart <= 2.0 * errors + 1e-9 and not wound(one.strain, other.strain)
+
+
+def wound(one: float, other: float) -> bool:
+    """Whether states in the same places differ by whole turns of springs, told by their elastic energies."""
+    return abs(one - other) > WOUND * (one + other) + tolerances.LEVEL
 
 
 def missing(answers: Sequence[Equilibrium]) -> str:

@@ -35,7 +35,7 @@ from .member_contact_steps import MemberContactSteps
 from .meshing import EquilibriumResult, Meshing
 from .mirrors import mirrored, mirrors
 from .refinement import LEVELS, Refinement
-from .several import Search, Waiting, long_elements, same
+from .several import Search, Waiting, long_elements, same, wound
 from .single import solved_from
 from .solution import Equilibrium
 from .ways import Ways
@@ -58,6 +58,9 @@ MOST, MOST_ELEMENTS = 16, 48
 
 ALIKE = 2e-3
 """Difference of positions, over the size, up to which rough equilibria with as many unstable modes are one."""
+
+LASTING = 1e-9
+"""Share of the loads up to which a push is rounding."""
 
 FALLS = 6
 """Unstable equilibria whose ways downhill are followed in contact, at most, where ends of elements are not all that may
@@ -229,7 +232,9 @@ class SeveralInContact:
         run, rough = self.run, [first]
 
         def add(found: Solved | None, notes: tuple[str, ...] = ()) -> None:
-            if found is not None and not any(alike(found, other.found) for other in rough):
+            # What only just touches is an equilibrium without contact.
+            idle = found is not None and found.model.mesh.points and not pushed(found)
+            if found is not None and not idle and not any(alike(found, other.found) for other in rough):
                 rough.append(Rough(found, run.lines.keys, notes))
 
         for number, found in enumerate(result.found):
@@ -258,7 +263,7 @@ class SeveralInContact:
             # Displacements that are unknowns, which an image has not, are found with what touches.
             level = len(free.model.positions.unknowns) > 0
             level |= abs(there.point.potential - energy) <= ALIKE * max(abs(energy), there.point.strain)
-            if level and all(largest_difference(there.fields, other.fields) > ALIKE for other in known):
+            if level and not any(beside(there, other) for other in known):
                 arrived = result.ends.arrived(there.state, ())
                 if arrived is not None:
                     yield arrived[1]
@@ -288,8 +293,19 @@ class SeveralInContact:
         return None if short and not self.meshes.prescribed else answer
 
 
+def pushed(found: Solved) -> bool:
+    """Whether something pushes by more than rounding."""
+    forces = (found.fields.contact_point(point)["push"] for point in found.model.mesh.points)
+    return max(forces) > LASTING * found.model.scales.force * max(1.0, found.prepared.load_size)
+
+
 def alike(one: Solved, other: Solved) -> bool:
     """Whether two rough equilibria are one."""
     if one.negative != other.negative or {p.pair for p in points_of(one)} != {p.pair for p in points_of(other)}:
         return False
-    return largest_difference(one.fields, other.fields) < ALIKE
+    return beside(one, other)
+
+
+def beside(one: Solved, other: Solved) -> bool:
+    """Whether two states are in the same places, with springs wound up by the same turns."""
+    return largest_difference(one.fields, other.fields) < ALIKE and not wound(one.point.strain, other.point.strain)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from .. import tolerances
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
 from .between_states import turned_between
@@ -72,7 +72,7 @@ def deflated(
         # The step of the deflated equations points along the plain one, forwards or backwards.
         turned = step[: equations.rotation_unknowns]
         left = 1.0 - sum(_slope(equations, here.state, other, turned) for other in known)
-        stretch = min(1.0 / max(abs(left), 1e-12), LONGEST / length)
+        stretch = min(1.0 / max(abs(left), 1e-12), LONGEST / max(length, TINY))
         state = equations.moved(here.state, (stretch if left > 0.0 else -stretch) * step)
         return replace(moving.at(state), count=here.count + 1)
 
