@@ -78,7 +78,7 @@ FORCE, HEIGHT = 3.0, 0.3
 @pytest.fixture(scope="module")
 def pressed():
     """Two bars between walls, below and beyond the critical force of 2."""
-    return solve(made(bars(FORCE, HEIGHT, steps=[0.5, 1.0], accuracy=1e-9)), runs=14)
+    return solve(made(bars(FORCE, HEIGHT, steps=[0.5, 1.0], accuracy=1e-9)), runs=10)
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.0])
