@@ -222,6 +222,43 @@ def test_member_rests_on_another_or_hangs_beside_it():
     np.testing.assert_allclose(hangs.position("B"), alone.position("B"), atol=2e-4)
 
 
+def over_ball(contact, **more):
+    """A cantilever that a force at its tip bends over a ball or a disc."""
+    return {
+        "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "loads": {"P": {"type": "force", "node": "B", "value": [0, -3]}},
+        "contacts": {"ball": {"center": [0.5, -0.3], "radius": 0.2, "member": "m", **contact}},
+        "analysis": {"accuracy": 1e-4, "equilibria": "all"},
+        **more,
+    }
+
+
+def test_strip_slides_off_a_ball_to_either_side_and_stands_on_it_as_on_a_disc():
+    answer = solve(made(over_ball({"type": "sphere"}, dimension="space")), runs=6)
+    one, other, above = sorted(answer.steps, key=lambda step: step.potential)
+    np.testing.assert_allclose(one.position("B"), [1, 1, -1] * other.position("B"), atol=1e-3)
+    assert abs(one.position("B")[2]) > 0.01
+    assert [step.certificate.negative for step in (one, other, above)] == [0, 0, 1]
+    plane = over_ball({"type": "circle"}, sections={"s": {"EI3": 1.0}}, analysis={"accuracy": 1e-4})
+    on_disc = solve(made(plane)).last
+    # In the plane it cannot slide off.
+    assert on_disc.certificate.stable
+    np.testing.assert_allclose(above.position("B"), on_disc.position("B"), atol=1e-4)
+    np.testing.assert_allclose(above.energy["total"], on_disc.energy["total"], rtol=1e-4)
+
+
+@pytest.mark.parametrize(("stop", "pushed"), [(0.4, 0), (0.8, 2)])
+def test_what_is_nearer_stops_bars_the_stop_of_their_spring_or_a_wall(stop, pushed):
+    table = bars(FORCE, HEIGHT)
+    table["springs"]["k"]["stop"] = [-stop, stop]
+    steps = solve(made(table), runs=6).steps
+    turn = min(0.5 * stop, math.asin(HEIGHT))
+    np.testing.assert_allclose(sorted(map(turned, steps)), [-turn, 0.0, turn], atol=1e-9)
+    assert sum(bool(pushes(step)) for step in steps) == pushed
+
+
 def test_surfaces_that_are_drawn_back_stay_on_their_side_of_what_is_round():
     table = arch(1.0, -0.5)
     table["contacts"] |= {

@@ -8,6 +8,7 @@ too; then it is refined as a single answer is, but kept where it is unstable.
 
 from __future__ import annotations
 
+import contextlib
 import weakref
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -101,6 +102,13 @@ class SearchInContact(Search):
         deep = max(-self.held(found).stability.smallest, 0.0)
         return self.ends.downhill(self.moved(found.state, shape), deep)
 
+    def go_on(self) -> bool:
+        """As of :meth:`.Search.go_on`, past states far from rest whose stability has no answer."""
+        try:
+            return super().go_on()
+        except SolveError:
+            return True
+
     def _arrived(self, start: State, known: Sequence[State]) -> Solved | None:
         found = self.ends.arrived(start, known)
         if found is None:
@@ -188,6 +196,8 @@ class SeveralInContact:
             runs = max(FEWEST_RUNS, min(RUNS, EFFORT // effort))
         images, loading = mirrors(free.model), way(free.model)
         result = SearchInContact(free, loading, runs, images, ends=ends)
+        if not free.equations.rotation_unknowns:
+            return result
         result.offer("given", *(partial(result.closed, state) for state in begun), deflate=False)
         alone = Search(free, loading, min(FREE, runs), images)
         alone.look()
@@ -233,16 +243,18 @@ class SeveralInContact:
 
         def add(found: Solved | None, notes: tuple[str, ...] = ()) -> None:
             # What only just touches is an equilibrium without contact.
-            idle = found is not None and found.model.mesh.points and not pushed(found)
-            if found is not None and not idle and not any(alike(found, other.found) for other in rough):
-                rough.append(Rough(found, run.lines.keys, notes))
+            if found is None or (found.model.mesh.points and not pushed(found)):
+                return
+            with contextlib.suppress(SolveError):
+                if not any(alike(found, other.found) for other in rough):
+                    rough.append(Rough(found, run.lines.keys, notes))
 
         for number, found in enumerate(result.found):
             add(brought_in(run, result.held(found), way), result.family_note(number))
         # The search itself goes downhill where ends of elements are all that may touch.
         falls = 0 if all(map(stops_ends, run.closest.pairs.values())) else FALLS
         for one in rough:
-            for image in self._images(result, one.found, [other.found for other in rough]):
+            for image in self._images(result, one.found, rough):
                 add(brought_in(run, image, way))
             for side in (1, -1) if falls and one.found.negative else ():
                 falls -= side > 0
@@ -251,9 +263,9 @@ class SeveralInContact:
         return rough
 
     @staticmethod
-    def _images(result: SearchInContact, found: Solved, known: Sequence[Solved]) -> Iterator[Solved]:
-        """Mirror images that are none of the known ones and have as much energy, with what ends of elements touch there
-        and without.
+    def _images(result: SearchInContact, found: Solved, known: Sequence[Rough]) -> Iterator[Solved]:
+        """Mirror images that are none of the known ones, which may become more, and have as much energy: with what ends
+        of elements touch there and, where that is not enough, without.
         """
         free = result.prepared
         state = transferred(found.model, found.state, free.model)
@@ -263,10 +275,11 @@ class SeveralInContact:
             # Displacements that are unknowns, which an image has not, are found with what touches.
             level = len(free.model.positions.unknowns) > 0
             level |= abs(there.point.potential - energy) <= ALIKE * max(abs(energy), there.point.strain)
-            if level and not any(beside(there, other) for other in known):
+            arrived = None
+            if level and not any(beside(there, other.found) for other in known):
                 arrived = result.ends.arrived(there.state, ())
-                if arrived is not None:
-                    yield arrived[1]
+                yield there if arrived is None else arrived[1]
+            if arrived is not None and not any(beside(there, other.found) for other in known):
                 yield there
 
     def _at(self, one: Rough) -> None:
