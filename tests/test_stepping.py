@@ -1,7 +1,8 @@
-"""Steps with impulses: closed forms, momenta, energy, penetration, and agreement with the motion event by event."""
+"""Steps with impulses: closed forms, momenta, energy, penetration, friction, agreement with motions event by event."""
 
 import itertools
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from sfetcas import SceneError, solve
 from sfetcas.contact.closest import Closest
 from sfetcas.contact.nearby import Nearby
 from sfetcas.dynamics.beginning import at_rest
-from sfetcas.mathematics.complementarity import complementary
-from sfetcas.mechanics.center_lines import Along, Lines
+from sfetcas.dynamics.gaps import Near, Touching
+from sfetcas.mathematics import complementarity
+from sfetcas.mathematics.complementarity import Friction, complementary
+from sfetcas.mechanics.center_lines import Along, Lines, gained
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
 from sfetcas.mechanics.mesh import uniform_mesh
@@ -29,8 +32,11 @@ def stepped(table, step, **more):
     return solve(made({**table, "analysis": analysis}))
 
 
-def bars(kind, end, *, space=True, restitution=0.0, **more):
-    """Two bars that fly towards each other, crosswise in space; in the plane an end hits a side."""
+def bars(kind, end, *, space=True, restitution=0.0, friction=0.0, **more):
+    """Two bars that fly towards each other, crosswise in space; in the plane an end hits a side.
+
+    With friction the first one also moves along the other.
+    """
     nodes = {"a": [-0.5, 0.0, 0.0], "b": [0.5, 0.0, 0.0], "c": [0.2, 0.1, -0.5], "d": [0.2, 0.1, 0.5]}
     if not space:
         nodes |= {"c": [0.1, 0.05, 0.0], "d": [0.4, 0.8, 0.0]}
@@ -40,11 +46,22 @@ def bars(kind, end, *, space=True, restitution=0.0, **more):
     return {
         "dimension": "space" if space else "plane",
         "sections": {"s": {**section, **more}},
-        "nodes": {n: {"position": at[:axes], "velocity": [0.0, up[n]]} for n, at in nodes.items()},
+        "nodes": {
+            n: {"position": at[:axes], "velocity": [0.3 * (friction > 0.0) * (n in "ab"), up[n]]}
+            for n, at in nodes.items()
+        },
         "members": {
             m: {"nodes": list(ends), "section": "s", "type": kind, **elements} for m, ends in (("m", "ab"), ("n", "cd"))
         },
-        "contacts": {"c": {"type": "members", "members": "all", "radius": RADIUS, "restitution": restitution}},
+        "contacts": {
+            "c": {
+                "type": "members",
+                "members": "all",
+                "radius": RADIUS,
+                "restitution": restitution,
+                "friction": friction,
+            }
+        },
         "analysis": {"type": "dynamic", "end": end, "output": end / 10},
     }
 
@@ -138,10 +155,20 @@ def test_rigid_bars_hit_each_other_as_event_by_event(space, restitution):
     assert deepest(motion) > -1e-6 * RADIUS
 
 
-@pytest.mark.parametrize("space", [False, True])
-@pytest.mark.parametrize("restitution", [0.0, 1.0])
-def test_flexible_bars_keep_momenta_and_lose_energy(space, restitution):
-    motion = stepped(bars("flexible", 0.3, space=space, restitution=restitution, damping=0.0), 0.004)
+@pytest.mark.parametrize(
+    ("kind", "space", "restitution", "friction"),
+    [
+        ("rigid", True, 0.6, 0.4),
+        ("flexible", False, 1.0, 0.4),
+        ("flexible", False, 0.0, 0.0),
+        ("flexible", False, 1.0, 0.0),
+        ("flexible", True, 0.0, 0.4),
+        ("flexible", True, 1.0, 0.0),
+    ],
+)
+def test_bars_keep_momenta_and_lose_energy(kind, space, restitution, friction):
+    """With friction at the surfaces of both, not at their centre lines, angular momentum too."""
+    motion = stepped(bars(kind, 0.3, space=space, restitution=restitution, friction=friction), 0.006)
     assert motion.events
     for kind in ("linear", "angular"):
         values = np.array([step.momentum[kind] for step in motion.steps])
@@ -204,10 +231,113 @@ def test_rods_that_lie_along_each_other_do_not_penetrate_anywhere():
     assert deepest(motion) > -1e-6 * RADIUS
 
 
+# -- friction -----------------------------------------------------------------------------------------------
+
+DIAMETER, SLOPE = 2 * RADIUS, 0.3
+
+
+def slope(friction, *, crosswise, speed=0.0, end=0.2):
+    """A held rail that goes down in the plane, and a block on it with two round feet; or two rails, a rod across."""
+    down, up = (np.array(v) for v in ([np.cos(SLOPE), -np.sin(SLOPE)], [np.sin(SLOPE), np.cos(SLOPE)]))
+    axes = 3 if crosswise else 2
+
+    def at(along, across, aside=0.0):
+        return [*(along * down + across * up), aside][:axes]
+
+    rails = {f"rail{k}": z for k, z in enumerate((-0.2, 0.2) if crosswise else (0.0,))}
+    nodes, members = {}, {}
+    for rail, z in rails.items():
+        nodes |= {f"{rail} a": {"position": at(-0.2, 0.0, z), "support": "clamped"}}
+        nodes |= {f"{rail} b": {"position": at(1.0, 0.0, z)}}
+        members[rail] = {"nodes": [f"{rail} a", f"{rail} b"]}
+    if crosswise:
+        chain, ways = ["m", "n"], [(0.0, DIAMETER, -0.3), (0.0, DIAMETER, 0.3)]
+    else:
+        chain, ways = ["m", "k", "l", "n"], [(0.0, DIAMETER), (0.0, 0.05), (0.1, 0.05), (0.1, DIAMETER)]
+    start = {} if speed == 0.0 else {"velocity": [*(speed * down), 0.0][:axes]}
+    nodes |= {name: {"position": at(*way), **start} for name, way in zip(chain, ways, strict=True)}
+    members |= {f"{a}{b}": {"nodes": [a, b]} for a, b in itertools.pairwise(chain)}
+    touching = [*rails, "mn"] if crosswise else [*rails, "mk", "ln"]
+    return {
+        "dimension": "space" if crosswise else "plane",
+        "gravity": [0, -G],
+        "sections": {"s": {"shape": "circle", "radius": RADIUS, "E": 1e9, "nu": 0.3, "rho": 1000.0}},
+        "nodes": nodes,
+        "members": {name: {**member, "section": "s", "type": "rigid"} for name, member in members.items()},
+        "contacts": {"c": {"type": "members", "members": touching, "friction": friction}},
+        "analysis": {"type": "dynamic", "end": end, "output": end / 5},
+    }
+
+
+def moved_down(motion):
+    """How far it has moved down the slope at the times of the answer, m."""
+    at = motion.positions("m")
+    return (at - at[0]) @ [np.cos(SLOPE), -np.sin(SLOPE), 0.0]
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.4])
+def test_a_block_slides_on_a_rail_or_sticks(friction):
+    """Below the angle of friction it does not creep; above it slides with g (sin a - mu cos a)."""
+    motion = stepped(slope(friction, crosswise=False), 0.01)
+    told, weight = motion.last.contacts["c"], 0.16 * np.pi * RADIUS**2 * 1000.0 * G
+    pull, push = np.sin(SLOPE), np.cos(SLOPE)
+    if friction > np.tan(SLOPE):
+        # Rounding of places of 0.1 m.
+        assert np.abs(moved_down(motion)).max() < 1e-13
+        assert all(told["sticking"])
+        np.testing.assert_allclose(np.linalg.norm(np.sum(told["friction"], axis=0)), pull * weight, rtol=1e-6)
+    else:
+        fall = 0.5 * G * (pull - friction * push) * motion.times**2
+        # Normals turn by a tenth in a step in which it moves by a tenth of their distance: to the square of half of it.
+        np.testing.assert_allclose(moved_down(motion), fall, rtol=2e-3, atol=1e-6)
+        assert not any(told["sticking"])
+        np.testing.assert_allclose(np.linalg.norm(told["friction"], axis=1).sum(), friction * push * weight, rtol=1e-3)
+    assert np.diff(motion.energies()).max() < 1e-15
+    assert deepest(motion) > -1e-6 * RADIUS
+
+
+def test_a_block_that_slides_up_or_down_stops_where_its_energy_says():
+    """It is held back by mu N - W sin a, and then stays."""
+    friction, speed = 0.6, 0.3
+    motion = stepped(slope(friction, crosswise=False, speed=speed), 0.01)
+    way = 0.5 * speed**2 / (G * (friction * np.cos(SLOPE) - np.sin(SLOPE)))
+    # Of the first order: it stops within a step, in which it moves by up to 1 % of the way.
+    assert moved_down(motion)[-1] == pytest.approx(way, rel=1e-2)
+    assert moved_down(motion)[-1] == pytest.approx(moved_down(motion)[-2], abs=1e-13)
+    assert np.diff(motion.energies()).max() < 1e-15
+
+
+@pytest.mark.parametrize("friction", [0.08, 0.4])
+def test_a_rod_rolls_or_slides_down_two_rails(friction):
+    """It rolls with 2/3 g sin a if friction can be a third of the pull, and spins more slowly than it slides else."""
+    motion = stepped(slope(friction, crosswise=True), 0.01)
+    pull, push = np.sin(SLOPE), np.cos(SLOPE)
+    rolls = friction > np.tan(SLOPE) / 3.0
+    faster = G * pull * 2.0 / 3.0 if rolls else G * (pull - friction * push)
+    # As the block, at up to twice the speed.
+    np.testing.assert_allclose(moved_down(motion), 0.5 * faster * motion.times**2, rtol=2e-3, atol=1e-6)
+    spin = faster / RADIUS if rolls else 2.0 * friction * G * push / RADIUS
+    assert motion.last.angular_velocity("m")[2] == pytest.approx(-spin * motion.times[-1], rel=5e-3)
+    assert motion.last.contacts["c"]["sticking"] == [rolls, rolls]
+    np.testing.assert_allclose(balance(motion), balance(motion)[0], atol=1e-8)
+
+
+def test_a_ball_slides_on_a_floor_and_stops():
+    """After v^2 / 2 mu g, and stays."""
+    table = ball({**FLOOR, "friction": 0.5}, [0, 0], {"end": 0.3, "output": 0.05}, velocity=[1.0, 0.0])
+    motion = stepped(table, 0.01)
+    assert motion.last.position("B")[0] == pytest.approx(0.1, abs=1e-6)
+    assert motion.last.contacts["stop"]["sticking"] == ["nodes.B"]
+    sliding = motion.at(0.1).contacts["stop"]
+    np.testing.assert_allclose(sliding["friction"], [-10.0, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(sliding["force"], [-10.0, 20.0, 0.0], atol=1e-9)
+    assert motion.last.energy["dissipated"] == pytest.approx(1.0, rel=1e-9)
+
+
 # -- many ---------------------------------------------------------------------------------------------------
 
 
-def heap(count, kind="flexible"):
+def heap(count, kind="flexible", friction=0.0):
     """Rods that lie above each other and fall on a floor."""
     rng, nodes, members = np.random.default_rng(1), {}, {}
     for k in range(count):
@@ -223,16 +353,16 @@ def heap(count, kind="flexible"):
         "nodes": nodes,
         "members": members,
         "contacts": {
-            "c": {"type": "members", "members": "all", "radius": RADIUS},
-            "floor": {"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0], "members": "all"},
+            "c": {"type": "members", "members": "all", "radius": RADIUS, "friction": friction},
+            "floor": {"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0], "members": "all", "friction": friction},
         },
         "analysis": {"type": "dynamic", "end": 0.2, "output": 0.02},
     }
 
 
-@pytest.mark.parametrize("kind", ["rigid", "flexible"])
-def test_a_heap_falls_without_gaining_energy_or_penetrating(kind):
-    motion = stepped(heap(4, kind), 0.002)
+@pytest.mark.parametrize(("kind", "friction"), [("rigid", 0.3), ("rigid", 0.0), ("flexible", 0.0), ("flexible", 0.3)])
+def test_a_heap_falls_without_gaining_energy_or_penetrating(kind, friction):
+    motion = stepped(heap(4, kind, friction), 0.002)
     touched = {event.name for event in motion.events}
     assert touched == {"contacts.c", "contacts.floor"}
     weight = 4 * 0.6 * np.pi * RADIUS**2 * 1000.0 * G
@@ -248,28 +378,26 @@ def test_a_heap_falls_without_gaining_energy_or_penetrating(kind):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (
-            {"friction": 0.3},
-            r"contacts.floor.friction: found with the integrator 'stepping', which has impulses across",
-        ),
         ({"initial": "equilibrium"}, r"analysis.initial: found 'equilibrium' with the integrator 'stepping'"),
         ({"step": None}, r"analysis.step: the key 'step' is missing"),
-        ({"motion": True}, r"motions.push: found with the integrator 'stepping'"),
     ],
 )
 def test_what_steps_with_impulses_do_not_know_is_refused(change, message):
     table = rod(0.3, 0.1, {"end": 0.2, "integrator": "stepping", "step": 0.01})
-    if "friction" in change:
-        table["contacts"]["floor"]["friction"] = change["friction"]
-    elif "motion" in change:
-        table["nodes"]["A"]["support"] = "clamped"
-        table["motions"] = {"push": {"node": "A", "displacement": [0.1, 0.0], "history": "h"}}
-        table["histories"] = {"h": {"t": [0, 1], "polynomial": [[0, 0, 1]]}}
-    else:
-        table["analysis"] |= change
-        table["analysis"] = {key: value for key, value in table["analysis"].items() if value is not None}
+    table["analysis"] |= change
+    table["analysis"] = {key: value for key, value in table["analysis"].items() if value is not None}
     with pytest.raises(SceneError, match=message):
         solve(made(table))
+
+
+def test_friction_between_members_is_refused_where_it_is_not_known():
+    """Event by event, and where it would spin a member without inertia."""
+    table = bars("rigid", 0.1, friction=0.3)
+    with pytest.raises(SceneError, match=r"contacts.c.friction: found between members in a motion, .* 'stepping'"):
+        solve(made(table))
+    table["sections"]["s"].pop("rhoI")
+    with pytest.raises(SceneError, match=r"contacts.c: found the member 'm', which friction would spin .* rhoI"):
+        stepped(table, 0.01)
 
 
 def test_what_begins_inside_is_refused():
@@ -308,6 +436,37 @@ def test_complementarity_against_all_choices(count, rank):
     np.testing.assert_allclose(rows.T @ found, best[0], atol=1e-7)
 
 
+@pytest.mark.parametrize("directions", [1, 2])
+@pytest.mark.parametrize("start", ["newton", "rounds"])
+def test_impulses_obey_the_law_of_coulomb(directions, start, monkeypatch):
+    """Of as many contacts as there are unknowns, also where Newton's method does not end by itself."""
+    rng, count = np.random.default_rng(directions), 12
+    if start == "rounds":
+        own, tries = complementarity._by_newton_with_friction, itertools.count()
+        monkeypatch.setattr(
+            complementarity, "_by_newton_with_friction", lambda *a: None if next(tries) < 6 else own(*a)
+        )
+    size = count * (1 + directions)
+    rows = rng.normal(size=(size, 2 * size))
+    matrix, b = rows @ rows.T / size, rows @ rng.normal(size=2 * size)
+    law = Friction(
+        np.arange(count), count + np.arange(count * directions).reshape(count, -1), rng.uniform(0.3, 2, count)
+    )
+    found = complementary(csc_matrix(matrix), b, np.zeros(size), law)
+    found = complementary(csc_matrix(matrix), b, found, law)
+    opening = matrix @ found + b
+    pushes, slips, along = found[:count], opening[law.along], found[law.along]
+    speed, most = np.linalg.norm(slips, axis=1), law.coefficients * pushes
+    # A small diagonal of 1e-7 has its share after two solutions.
+    assert min(found[:count].min(), opening[:count].min()) > -1e-6
+    assert np.abs(pushes * opening[:count]).max() < 1e-6
+    assert (np.linalg.norm(along, axis=1) < most + 1e-9).all()
+    slides = speed > 1e-5
+    assert slides.sum() > 1
+    assert (~slides & (pushes > 0.0)).sum() > 1
+    np.testing.assert_allclose(along[slides], -(most / speed)[slides, None] * slips[slides], atol=1e-5)
+
+
 def _near(dimension, seed=3):
     """Equations and a state of rods at random, of which some are rigid and one is curved."""
     rng, nodes, members = np.random.default_rng(seed), {}, {}
@@ -321,7 +480,7 @@ def _near(dimension, seed=3):
         kinds = ({"type": "rigid"}, {}, {"shape": {"type": "arc", "angle": 0.5}})
         members[f"m{k}"] = {"nodes": [f"a{k}", f"b{k}"], "section": "s", **kinds[k % 3 if k < 3 else 1]}
     section = {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0, "rhoA": 1.0}
-    contact = {"type": "members", "members": "all", "radius": RADIUS}
+    contact = {"type": "members", "members": "all", "radius": RADIUS, "friction": 0.3}
     table = {"dimension": dimension, "sections": {"s": section}, "nodes": nodes, "members": members}
     scene = made({**table, "contacts": {"c": contact}})
     mesh = uniform_mesh(scene, 2, 5)
@@ -351,6 +510,43 @@ def test_lines_have_the_derivatives_of_their_positions(dimension):
         for s in (1e-6, -1e-6)
     ]
     np.testing.assert_allclose(found @ step, (ends[0] - ends[1]) / 2e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_gaps_and_slips_gain_what_their_rows_say(dimension):
+    """Exactly between two states that differ much; and in small steps of the end by its derivatives."""
+    equations, state = _near(dimension)
+    touching = Touching(SimpleNamespace(model=equations.model, tables=equations.tables))
+    rng, axes = np.random.default_rng(0), touching.axes
+
+    def pose(state):
+        return touching.pose(state.q, (equations.model.positions.Y @ state.y).reshape(-1, axes))
+
+    def moved(state, size):
+        step = np.concatenate([size * rng.normal(size=equations.unknowns), np.zeros(equations.rows)])
+        return equations.moved(state, step), step
+
+    after, _ = moved(state, 0.1)
+    begin, end = pose(state), pose(after)
+    near = Near(touching.nearby.found(begin.curve, 0.2), np.zeros(0, int))
+    assert len(near) > 5
+    full = np.concatenate([gained(begin.q, end.q).ravel(), (end.places - begin.places).ravel()])
+    rows = touching.rows(begin, end, near, middle=True)
+    slips = touching.slips(begin, end, near)
+    assert len(slips) == (axes - 1) * len(near)
+    told = np.concatenate([touching.gaps(end, near) - touching.gaps(begin, near), slips])
+    np.testing.assert_allclose(rows.along(full), told, atol=1e-13)
+    matrix = touching.rows(begin, end, near, near).matrix(touching.lines)
+    further, step = moved(after, 1e-6)
+    there = pose(further)
+    # Directions across the normal turn with it, which Newton's method leaves out: by the slip over the distance.
+    apart = np.linalg.norm(touching.nearby.between(end.curve, near.places), axis=1)
+    left_out = 1e-4 * (1.0 + np.abs(told).max() / apart.min())
+    change = np.concatenate([touching.gaps(there, near), touching.slips(begin, there, near)]) - np.concatenate(
+        [touching.gaps(end, near), slips]
+    )
+    np.testing.assert_allclose(matrix[: len(near)] @ step, change[: len(near)], atol=1e-9)
+    assert np.abs(matrix[len(near) :] @ step - change[len(near) :]).max() < left_out
 
 
 @pytest.mark.parametrize("dimension", ["plane", "space"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,10 +23,15 @@ def push_at(fields: Fields, spot: Spot) -> Array:
     return np.asarray(-fields.state.lam[model.row_names.index(spot.name)] * normal[0] * model.scales.force)
 
 
-def pressed(fields: Fields, contacts: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """For each contact between members what :func:`~sfetcas.contact.closest.answers` gives, without friction."""
+def pressed(
+    fields: Fields, contacts: Sequence[str], friction: Mapping[str | Approach, tuple[Array, bool]]
+) -> dict[str, dict[str, Any]]:
+    """For each contact between members what :func:`~sfetcas.contact.closest.answers` gives.
+
+    ``friction`` has, for approaches, the force (3,) of friction on the first member, N, and whether it sticks.
+    """
     model, found = fields.model, dict[str, dict[str, Any]]()
-    entries = sorted(_entries(fields), key=lambda entry: (entry[0], entry[1]["member"], entry[1]["at"]))
+    entries = sorted(_entries(fields, friction), key=lambda entry: (entry[0], entry[1]["member"], entry[1]["at"]))
     closest = Closest(model.scene)
     for name in contacts:
         own = [entry for contact, entry in entries if contact == name]
@@ -34,12 +39,14 @@ def pressed(fields: Fields, contacts: Sequence[str]) -> dict[str, dict[str, Any]
             gap = closest.gap(fields, name)
             nothing = {"force": np.zeros(3), "at": None, "gap": gap, "member": None}
             found[name] = {**nothing, "other": None, "other_at": None}
+            if model.scene.contacts[name].friction:
+                found[name] |= {"friction": np.zeros(3), "sticking": None}
             continue
         found[name] = own[0] if len(own) == 1 else {key: [e[key] for e in own] for key in own[0]}
     return found
 
 
-def _entries(fields: Fields) -> list[tuple[str, dict[str, Any]]]:
+def _entries(fields: Fields, friction: Mapping[str | Approach, tuple[Array, bool]]) -> list[tuple[str, dict[str, Any]]]:
     """The contact and what is told of each place where members touch."""
     model, found = fields.model, list[tuple[str, dict[str, Any]]]()
     number = {name: i for i, name in enumerate(model.row_names)}
@@ -53,6 +60,9 @@ def _entries(fields: Fields) -> list[tuple[str, dict[str, Any]]]:
             apart = float(np.linalg.norm(one - other))
             force = -fields.state.lam[number[near.name]] * (one - other) / apart * model.scales.force
             told = {"force": force, "at": at_members[0], "gap": apart - near.distance, "member": near.members[0]}
+            if model.scene.contacts[near.contact].friction:
+                along, sticks = friction.get(near, (np.zeros(3), False))
+                told |= {"force": force + along, "friction": along, "sticking": sticks}
             found.append((near.contact, {**told, "other": near.members[1], "other_at": at_members[1]}))
     return found
 

@@ -92,7 +92,7 @@ def check_contact(
         if contact.node is not None:
             _check_carried(analysis, contact, nodes[contact.node], motions.values(), where)
         if analysis.integrator == "stepping":
-            _check_stepping(analysis, name, contact)
+            _check_stepping(analysis, name, contact, members, sections, space)
         # Names of nothing are refused elsewhere.
         for member in (name for name in members_of(contact, members) if name in members):
             section = sections.get(str(members[member].section))
@@ -106,33 +106,44 @@ def _check_carried(
 ) -> None:
     """Refuse an obstacle that a node carries with what motions do not know of it."""
     turned = any(motion.node == contact.node and motion.rotation is not None for motion in motions)
-    if contact.friction > 0.0 and (contact.type != "plane" or node.support != "clamped" or turned):
+    steps = analysis.integrator == "stepping"
+    if contact.friction > 0.0 and not steps and (contact.type != "plane" or node.support != "clamped" or turned):
         message = f"found of an obstacle that the node {contact.node!r} carries in a motion, accepted: of a plane on a"
-        raise SceneError(f"{message} clamped node that motions displace and do not turn, or 0", (*where, "friction"))
+        raise SceneError(
+            f"{message} clamped node that motions displace and do not turn, or 0, or 'stepping'", (*where, "friction")
+        )
     if analysis.initial == "equilibrium":
         message = "found 'equilibrium' with an obstacle that a node carries, accepted: a motion that begins undeformed"
         raise SceneError(message, ("analysis", "initial"))
 
 
-def _check_stepping(analysis: Analysis, name: str, contact: Contact) -> None:
+def _check_stepping(
+    analysis: Analysis,
+    name: str,
+    contact: Contact,
+    members: Mapping[str, Member],
+    sections: Mapping[str, CrossSection],
+    space: bool,
+) -> None:
     """Refuse what steps with impulses do not know."""
-    if contact.friction > 0.0:
-        message = "found with the integrator 'stepping', which has impulses across surfaces alone, accepted: radau-3"
-        raise SceneError(f"{message}, radau-2, generalised-alpha, or 0", ("contacts", name, "friction"))
-    if contact.node is not None:
-        message = f"found the node {contact.node!r} with the integrator 'stepping', accepted: radau-3, radau-2"
-        raise SceneError(f"{message}, generalised-alpha, or obstacles that stay", ("contacts", name, "node"))
     if analysis.initial == "equilibrium":
         message = "found 'equilibrium' with the integrator 'stepping', accepted: a motion that begins undeformed"
         raise SceneError(message, ("analysis", "initial"))
+    if not (contact.between_members and contact.friction > 0.0 and space):
+        return
+    for member in (name for name in members_of(contact, members) if name in members):
+        section = sections.get(str(members[member].section))
+        if section is None or not (section.inertia(HEAVY)[:, 0] > 0.0).all():
+            message = f"found the member {member!r}, which friction would spin about itself without inertia"
+            raise SceneError(f"{message}, accepted: a section with rhoI, or with a shape and rho", ("contacts", name))
 
 
 def _check_between(analysis: Analysis, name: str, contacts: Mapping[str, Contact]) -> None:
     """Refuse contact between members with what motions do not know beside it."""
     for other, contact in contacts.items():
-        if contact.friction > 0.0:
+        if contact.friction > 0.0 and analysis.integrator != "stepping":
             what = "between members" if contact.between_members else "beside contact between members"
-            message = f"found {what} in a motion, accepted: with analysis.type = 'static', or 0"
+            message = f"found {what} in a motion, accepted: with the integrator 'stepping', in statics, or 0"
             raise SceneError(message, ("contacts", other, "friction"))
     if analysis.integrator == "generalised-alpha":
         found = "found with the integrator 'generalised-alpha', which does not follow where members touch each other"

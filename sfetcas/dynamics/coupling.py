@@ -41,6 +41,10 @@ class Moving:
         Energy that contact has taken so far.
     pushed : mapping
         For what has touched in the step before its impulse.
+    rubbed : mapping
+        For what has rubbed in it the impulse (axes,) of friction on it, or on the first member, and whether it sticks.
+    dragged : ndarray (full,)
+        The impulses of all friction by full coordinates; empty without friction.
     """
 
     t: float
@@ -50,6 +54,8 @@ class Moving:
     w: Array
     lost: float = 0.0
     pushed: dict[Any, float] = field(default_factory=dict)
+    rubbed: dict[Any, tuple[Array, bool]] = field(default_factory=dict)
+    dragged: Array = field(default_factory=lambda: np.zeros(0))
 
 
 class Bodies:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..mechanics.rubbing import Rubbing
     from .sampling import Sample
 
-__all__ = ["pushed_along", "rubbed"]
+__all__ = ["dragged", "pushed_along", "rubbed"]
 
 
 def rubbed(rubbing: Rubbing, equations: Equations, free: State, loading: Loading, sample: Sample) -> Array:
@@ -87,6 +87,15 @@ def pushed_along(rubbing: Rubbing, loading: Loading, forces: Array, arms: Array)
         moment[rubbing.turns[k]] += back
     force, own = loading.force + on_places, loading.own + on_places
     return replace(loading, force=force, own=own, couple=loading.couple + couple, moment=loading.moment + moment)
+
+
+def dragged(equations: Equations, loading: Loading, forces: Array) -> Loading:
+    """Loads with forces of friction by full coordinates (full,) added, dimensionless."""
+    tables = equations.tables
+    on_turns, on_places = np.split(forces[: tables.of_rows], [tables.of_places])
+    moment, force = np.zeros_like(loading.moment), on_places.reshape(loading.force.shape)
+    moment[:, 3 - tables.width :] = on_turns.reshape(len(moment), tables.width)
+    return replace(loading, force=loading.force + force, own=loading.own + force, moment=loading.moment + moment)
 
 
 REDUNDANT = 1e-9

@@ -25,12 +25,12 @@ from ..mechanics.balance import three
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
 from ..mechanics.memory import Remembering
-from ..mechanics.mesh import Approach
+from ..mechanics.mesh import Approach, Spot
 from ..mechanics.model import Model, assemble
 from ..mechanics.unilateral import UnilateralRows
 from ..solvers.redundancy import loose_rows
 from ..solvers.sharing import shared
-from .friction import pushed_along, rubbed
+from .friction import dragged, pushed_along, rubbed
 from .projecting import factor_closings
 
 if TYPE_CHECKING:
@@ -90,6 +90,8 @@ class Mover:
             friction = rubbed(system.rubbing, equations, free, balanced, sample)
             arms = system.rubbing.arms(sample.y, balanced.shift)
             balanced = pushed_along(system.rubbing, balanced, friction, arms)
+        if sample.dragged.size:
+            balanced = dragged(equations, balanced, sample.dragged)
         state = self._balanced(equations, free, balanced)
         fields = Fields(equations, state, balanced)
         kinetic = self.inertia.kinetic(sample.v)
@@ -106,16 +108,23 @@ class Mover:
             friction=self._friction(friction, sample),
         )
 
-    def _friction(self, forces: Array, sample: Sample) -> dict[str, tuple[Array, bool]]:
+    def _friction(self, forces: Array, sample: Sample) -> dict[str | Approach, tuple[Array, bool]]:
         """Of places that stick or slide, by the names of their rows, forces (3,) along obstacles, N, and which do."""
         rubbing, rubs = self.inertia.system.rubbing, sample.rubs
+        unit = self.model.scales.force
+        if sample.rubbed:
+            # Members may touch at several places whose rows have one name.
+            return {
+                key.name if isinstance(key, Spot) else key: (three(force) * unit, sticks)
+                for key, (force, sticks) in sample.rubbed.items()
+            }
         if rubbing is None or rubs is None:
             return {}
-        found = {}
+        found = dict[str | Approach, tuple[Array, bool]]()
         for k in np.flatnonzero(rubs.sticks + rubs.slides).tolist():
             spot = self.unilateral.parts[rubbing.of[k]].spot
             assert spot is not None
-            found[spot.name] = three(forces[k]) * self.model.scales.force, bool(rubs.sticks[k])
+            found[spot.name] = three(forces[k]) * unit, bool(rubs.sticks[k])
         return found
 
     @property
@@ -164,8 +173,8 @@ class MotionState(Configuration):
     energies : tuple of float
         Kinetic energy, elastic energy, potential of the loads, dimensionless; :attr:`energy` has them in N m.
     friction : mapping
-        For the row of each place that touches an obstacle with friction the force (3,) along it on the member, N, and
-        whether it sticks.
+        For what touches with friction, the name of the row of a place on an obstacle or where members are near to each
+        other, the force (3,) along the surfaces on the member or the first one, N, and whether it sticks.
     """
 
     where: ClassVar[str] = MOTION
@@ -174,7 +183,7 @@ class MotionState(Configuration):
     sample: Sample = field(repr=False)
     energies: tuple[float, float, float] = field(repr=False)
     mover: Mover = field(repr=False)
-    friction: Mapping[str, tuple[Array, bool]] = field(repr=False, default_factory=dict)
+    friction: Mapping[str | Approach, tuple[Array, bool]] = field(repr=False, default_factory=dict)
 
     def __repr__(self) -> str:
         energy = ", ".join(f"{kind} {number_in_words(value)}" for kind, value in self.energy.items())
@@ -248,7 +257,7 @@ class MotionState(Configuration):
             return {}
         closest, found = Closest(scene), dict[str, dict[str, Any]]()
         between = [name for name, one in scene.contacts.items() if one.between_members]
-        found |= pressed(self.fields, between) if between else {}
+        found |= pressed(self.fields, between, self.friction) if between else {}
         for name in scene.obstacles:
             force = sum((force for _, _, force in self.pushes(name)), np.zeros(3))
             spots = [spot for spot in model.mesh.spots or () if spot.contact == name]

@@ -9,8 +9,9 @@ are interpolated instead.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -62,6 +63,10 @@ class Sample:
         What the places that rub on obstacles do, and the directions of sliding a little earlier.
     unilateral : UnilateralRows
         The constraints of ``acting``.
+    dragged : ndarray (full,)
+        Forces of all friction by full coordinates, where they are told; else empty.
+    rubbed : mapping
+        For the spots and approaches of these the force (axes,) of friction, and whether it sticks.
     """
 
     t: float
@@ -77,6 +82,8 @@ class Sample:
     lost: float = 0.0
     rubs: Rubs | None = None
     unilateral: UnilateralRows = NONE
+    dragged: Array = field(default_factory=lambda: np.zeros(0))
+    rubbed: Mapping[Any, tuple[Array, bool]] = field(default_factory=dict)
 
 
 class Sampler:
@@ -312,7 +319,16 @@ def between(samples: Sequence[Sample], t: float) -> Sample:
         return np.tensordot(row, np.array([getattr(sample, part) for sample in samples]), 1)
 
     q = turned_by(near.q, np.einsum("n,nra->ra", row, turns))
-    given = near.unwrapped, near.remembered, near.acting, near.lost, near.rubs, near.unilateral
+    given = (
+        near.unwrapped,
+        near.remembered,
+        near.acting,
+        near.lost,
+        near.rubs,
+        near.unilateral,
+        near.dragged,
+        near.rubbed,
+    )
     return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), mean("spin"), *given)
 
 

@@ -31,7 +31,7 @@ Laursen and Chawla 1997 (conservation in contact).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -40,17 +40,18 @@ import numpy as np
 from .. import tolerances
 from ..contact.nearby import Places
 from ..errors import SceneError, SolveError, Status
+from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index, Sparse
-from ..mathematics.complementarity import complementary
+from ..mathematics.complementarity import Friction, complementary
 from ..mathematics.threads import one_thread
-from ..mechanics.center_lines import Curve
 from ..mechanics.equations import State
 from ..mechanics.mesh import Approach, Spot
+from ..mechanics.rotations import RotationFreedom
 from ..mechanics.unilateral import Unilateral, UnilateralRows
 from .conserving import check_conserving
 from .coupling import Bodies, Moving, StepEquations, factored
 from .events import Event
-from .gaps import Touching
+from .gaps import Near, Pose, Rows, Touching
 from .inertia import Inertia
 from .integrators import InitialState, Integrator, TimeGrid
 from .sampling import Sample
@@ -100,26 +101,26 @@ HALVED = 30
 
 @dataclass(frozen=True, eq=False)
 class _Course:
-    """A step: the state and the lines at its begin, its length, factors (2, groups) in its middle and at its end."""
+    """A step: the state and the pose at its begin, its length, factors (2, groups) in its middle and at its end."""
 
     begin: Moving
-    before: Curve
+    before: Pose
     h: float
     factors: Array
 
 
 @dataclass(frozen=True, eq=False)
 class _End:
-    """The end of a step: state, quantities and lines, the pairs of places and the numbers of spots that are looked at
-    with the forces of both, and factors of Newton's matrix.
+    """The end of a step: state, quantities and pose, what is looked at with forces (n, axes) across and along, places
+    at which these act in the step, and factors of Newton's matrix.
     """
 
     state: State
     x: Array
-    curve: Curve
-    places: Places
-    spots: Index
+    pose: Pose
+    near: Near
     forces: Array
+    acting: Near
     factors: Any = None
 
 
@@ -130,15 +131,12 @@ class Stepping(Integrator):
     def __init__(self, system: StageEquations, progress: Callable[[float], Any] | None = None) -> None:
         super().__init__(system, progress)
         check_conserving(system, "stepping")
-        for name in system.model.scene.motions:
-            message = (
-                "found with the integrator 'stepping', which knows no prescribed motion, accepted: radau-3, radau-2"
-            )
-            raise SceneError(f"{message}, generalised-alpha", ("motions", name))
         self._equations, self._touching = StepEquations(system), Touching(system)
         self._inertia = Inertia(system)
         self._bodies = Bodies(self._equations.bodies)
         self._axes, self._places = system.axes, system.places
+        self._driven = bool(system.model.scene.motions)
+        self._dragging = system.tables.full if self._touching.rubs else 0
 
     # -- the motion -----------------------------------------------------------------------------------
 
@@ -179,7 +177,8 @@ class Stepping(Integrator):
         rows = UnilateralRows(touched, np.zeros(count, np.intp), -np.ones(count), np.zeros(count))
         return Sample(
             at.t, at.state.q, at.state.y, at.x, at.v, (after.v - before.v) / h, spin, at.state.unwrapped,
-            acting=np.ones(count), lost=at.lost, unilateral=rows,
+            acting=np.ones(count), lost=at.lost, unilateral=rows, dragged=after.dragged / h,
+            rubbed={key: (impulse / h, sticks) for key, (impulse, sticks) in after.rubbed.items()},
         )  # fmt: skip
 
     def _told(self, before: Moving, after: Moving) -> None:
@@ -200,7 +199,7 @@ class Stepping(Integrator):
     def _stepped(self, begin: Moving, h: float) -> Moving:
         """The state after a step, which is halved where that is needed."""
         now, t, left, part = begin, begin.t, h, h
-        pushed = dict[Any, float]()
+        pushed, rubbed, dragged = dict[Any, float](), dict[Any, tuple[Array, bool]](), np.zeros(self._dragging)
         while left > tolerances.DECIMAL * h:
             part = min(part, left)
             found = self._step(now, part)
@@ -211,9 +210,11 @@ class Stepping(Integrator):
                 part *= 0.5
                 continue
             pushed = found.pushed
+            _add_rubbed(rubbed, found.rubbed)
+            dragged = dragged + found.dragged
             now, left = found, left - part
             self.count += 1
-        return replace(now, t=t + h, pushed=pushed)
+        return replace(now, t=t + h, pushed=pushed, rubbed=rubbed, dragged=dragged)
 
     def _factors(self, t: float, h: float) -> Array:
         """Factors (2, groups) of loads in the middle and at the end of a step."""
@@ -229,12 +230,12 @@ class Stepping(Integrator):
         touching, longest = self._touching, STRIDE * self._touching.distance
         if (stride := self._farthest(h * begin.v)) > longest:
             return None
-        course = _Course(begin, self._curve(begin.state, begin.x), h, self._factors(begin.t, h))
-        ahead, x = self._ahead(begin, h), begin.x + h * begin.v
-        curve, reach = self._curve(ahead, x), max(REACH * stride, CLOSE * min(touching.distance, 1.0))
-        places = touching.nearby.found(curve, reach)
-        spots = np.flatnonzero(touching.on_obstacles(self._displaced(x)).gaps < reach)
-        end: _End | None = _End(ahead, x, curve, places, spots, np.zeros(len(places) + len(spots)))
+        course = _Course(begin, self._pose(begin.state, begin.x), h, self._factors(begin.t, h))
+        ahead, x = self._ahead(course), begin.x + h * begin.v
+        pose, reach = self._pose(ahead, x), max(REACH * stride, CLOSE * min(touching.distance, 1.0))
+        places = touching.nearby.found(pose.curve, reach)
+        near = Near(places, np.flatnonzero(touching.on_obstacles(pose) < reach))
+        end: _End | None = _End(ahead, x, pose, near, np.zeros((len(near), self._axes)), near)
         for search in range(SEARCHES):
             end = None if end is None else self._pushed(course, end)
             if end is None or self._farthest(end.x - begin.x) > 2.0 * longest:
@@ -245,24 +246,28 @@ class Stepping(Integrator):
             # It stays where it is; at first a copy of it also goes on to where the distance is least.  Were all to go
             # on, they would follow each other where members are nearly parallel.
             more = more.fixed().with_more(more) if search < COPIED else more.fixed()
-            count = len(end.places)
-            forces = end.forces[:count], np.zeros(len(more)), end.forces[count:], np.zeros(len(missing))
-            places, spots = end.places.fixed().with_more(more), np.concatenate([end.spots, missing])
-            end = replace(end, places=places, spots=spots, forces=np.concatenate(forces))
+            count, nothing = len(end.near.places), np.zeros((len(more) + len(missing), self._axes))
+            parts = end.forces[:count], nothing[: len(more)], end.forces[count:], nothing[len(more) :]
+            near = Near(end.near.places.fixed().with_more(more), np.concatenate([end.near.spots, missing]))
+            end = replace(end, near=near, forces=np.concatenate(parts))
         return None
 
-    def _ahead(self, begin: Moving, h: float) -> State:
+    def _ahead(self, course: _Course) -> State:
         """Where a step would lead at constant rates; a body that rings faster than steps follow begins where it is."""
-        guess, bodies = h * begin.w, self._equations.bodies
+        begin, bodies = course.begin, self._equations.bodies
+        guess = course.h * begin.w
         guess[self.system.equations.unknowns :] = 0.0
         turned = np.zeros(int(bodies.max()) + 1)
         count = self.system.equations.rotation_unknowns
         np.maximum.at(turned, bodies[:count], np.abs(guess[:count]))
         guess[turned[bodies] > RINGS] = 0.0
-        return self.system.equations.moved(begin.state, guess)
+        state = self.system.equations.moved(begin.state, guess)
+        if not self._driven:
+            return state
+        return self.system.equations.holding(state, self.system.loading(course.factors[1]))
 
-    def _curve(self, state: State, x: Array) -> Curve:
-        return self._touching.lines.curve(state.q, self._displaced(x))
+    def _pose(self, state: State, x: Array) -> Pose:
+        return self._touching.pose(state.q, self._displaced(x))
 
     def _farthest(self, moved: Array) -> float:
         """How far any place moves in changes of the quantities (quantities,)."""
@@ -273,10 +278,10 @@ class Stepping(Integrator):
     def _penetrating(self, end: _End) -> tuple[Places, Index]:
         """What is inside of each other at the end of a step: pairs of places, and spots that are not yet looked at."""
         touching = self._touching
-        found = touching.nearby.found(end.curve, 0.0, ends=False)
-        deep = touching.nearby.gaps(end.curve, found) < -PENETRATION * 0.5 * touching.nearby.distance[found.pairs]
-        inside = np.flatnonzero(touching.on_obstacles(self._displaced(end.x)).gaps < -INSIDE)
-        return found.chosen(deep), np.setdiff1d(inside, end.spots)
+        found = touching.nearby.found(end.pose.curve, 0.0, ends=False)
+        deep = touching.nearby.gaps(end.pose.curve, found) < -PENETRATION * 0.5 * touching.nearby.distance[found.pairs]
+        inside = np.flatnonzero(touching.on_obstacles(end.pose) < -INSIDE)
+        return found.chosen(deep), np.setdiff1d(inside, end.near.spots)
 
     def _pushed(self, course: _Course, end: _End) -> _End | None:
         """The end of a step at which nothing penetrates at given places, by Newton's method from there; None where that
@@ -284,19 +289,21 @@ class Stepping(Integrator):
         """
         equations, unknowns, moved, last = self._equations, self.system.equations.unknowns, 0.0, False
         order, back = equations.order, np.argsort(equations.order)
-        state, places, forces, factors = end.state, end.places, end.forces, end.factors
+        touching, state, near, forces = self._touching, end.state, end.near, end.forces
+        acting, factors = near, end.factors
         yielding: Sparse = np.zeros((0, 0))
         for k in range(ITERATIONS):
             matrix, residual, x = equations.positions(state, course.begin, course.h, course.factors)
             if not (np.isfinite(residual).all() and np.isfinite(matrix.data).all()):
                 return None
-            curve = self._curve(state, x)
-            slides = k < SLIDING and bool((places.held < 3).any())
+            pose = self._pose(state, x)
+            slides = k < SLIDING and bool((near.places.held < 3).any())
             if slides and k:
-                places, forces, slides = self._slid(curve, places, forces)
-            now = _End(state, x, curve, places, end.spots, forces)
-            gaps, here = self._gaps(now)
-            along = self._derivatives(now, course)
+                near, forces, slides = self._slid(pose, near, forces)
+            friction = touching.friction(near)
+            acting = touching.passed(course.before, pose, near) if k <= SLIDING else acting
+            rows = touching.rows(course.before, pose, acting, middle=True)
+            along, friction = rows.matrix(touching.lines), friction.scaled(rows.lengths)
             # Near the end the same factors do as well.
             fresh = factors is None or moved > FRESH
             factors = factored(matrix) if fresh else factors
@@ -304,144 +311,182 @@ class Stepping(Integrator):
             def solve(right: Array, factors: Any = factors) -> Array:
                 return np.asarray(factors.solve(right[order])[back])
 
-            step = solve(along.T @ forces - residual)
-            if len(gaps):
-                if fresh or slides or yielding.shape[0] != len(gaps):
+            given = _listed(forces, friction)
+            step = solve(along.T @ given - residual)
+            if len(near):
+                here = touching.rows(course.before, pose, near, acting).matrix(touching.lines)
+                opened = np.concatenate([touching.gaps(pose, near), touching.slips(course.before, pose, acting)])
+                if fresh or slides or yielding.shape[0] != len(given):
                     yielding = self._bodies.coupled(solve, here, along)
-                found = complementary(yielding, gaps + here @ step - yielding @ forces, forces)
+                found = complementary(yielding, opened + here @ step - yielding @ given, given, friction)
                 if found is None:
                     return None
-                step, forces = step + solve(along.T @ (found - forces)), found
+                step, forces = step + solve(along.T @ (found - given)), _arranged(found, friction, forces)
             state, before = self.system.equations.moved(state, step), moved
             moved = float(np.abs(step[:unknowns]).max(initial=0.0))
             if not moved < FAR:
                 return None
             if last:
                 x = equations.quantities(state, course.factors[1])
-                return _End(state, x, self._curve(state, x), places, end.spots, forces, factors)
+                return _End(state, x, self._pose(state, x), near, forces, acting, factors)
             # Rounding may leave more than that, which falls no further.
             last = not slides and moved <= (CONVERGED if moved < 0.5 * before else LAST_CHANGE)
         return None
 
-    def _slid(self, curve: Curve, places: Places, forces: Array) -> tuple[Places, Array, bool]:
-        """Places that have gone on to where the distance is least, their forces, and whether that is still far."""
-        nearby = self._touching.nearby
-        found = nearby.nearest(curve, places, 2, CLOSE)
+    def _slid(self, pose: Pose, near: Near, forces: Array) -> tuple[Near, Array, bool]:
+        """What is looked at where places have gone on to where the distance is least, the forces, and whether that is
+        still far.
+        """
+        nearby, places = self._touching.nearby, near.places
+        found = nearby.nearest(pose.curve, places, 2, CLOSE)
         ends = ((x, y) for x, y in ((places.one, found.one), (places.other, found.other)))
         far = max(
             float(np.abs(self._touching.lines.lengths(y) - self._touching.lines.lengths(x)).max()) for x, y in ends
         )
         able = nearby.apart(found)
-        spots = np.ones(len(forces) - len(places), bool)
-        return found.chosen(able), forces[np.concatenate([able, spots])], far > SLID
-
-    def _gaps(self, end: _End) -> tuple[Array, Sparse]:
-        """Gaps (rows,) of what is looked at, and their derivatives (rows, total), at the end of a step."""
-        between, on = self._touching.between(end.curve, end.places), self._touching.on_obstacles(self._displaced(end.x))
-        rows = self._touching.derivatives(end.curve, end.places, end.spots, between, on)
-        return np.concatenate([between.gaps, on.gaps[end.spots]]), rows
-
-    def _derivatives(self, end: _End, course: _Course) -> Sparse:
-        """The derivatives between the begin and the end of a step."""
-        touching, earlier = self._touching, self._displaced(course.begin.x)
-        between = touching.between(end.curve, end.places, course.before)
-        on = touching.on_obstacles(self._displaced(end.x), earlier)
-        return touching.derivatives(course.before.mean(end.curve), end.places, end.spots, between, on)
+        kept = np.concatenate([able, np.ones(len(near.spots), bool)])
+        return Near(found.chosen(able), near.spots), forces[kept], far > SLID
 
     # -- velocities -----------------------------------------------------------------------------------
 
     def _impelled(self, course: _Course, end: _End) -> Moving | None:
         """The state after the impulses at the end of a step; None where none are found."""
-        begin, h, state = course.begin, course.h, end.state
+        begin, h, state, touching = course.begin, course.h, end.state, self._touching
         v = 2.0 * (end.x - begin.x) / h - begin.v
-        solve, momenta = self._equations.massive(state, course.factors[1], v)
+        drift, spins = self._drift(state, begin.t + h, course.factors[1])
+        solve, momenta = self._equations.massive(state, course.factors[1], v - drift)
         w = solve(momenta)
-        after = Moving(begin.t + h, state, end.x, v, w, begin.lost)
+        after = Moving(begin.t + h, state, end.x, v, w, begin.lost, dragged=np.zeros(self._dragging))
         if state.q.shape[1] == 4:
             self.norm = max(self.norm, float(np.abs(np.einsum("ij,ij->i", state.q, state.q) - 1.0).max(initial=0.0)))
-        gaps, rows = self._gaps(end)
-        closed = np.flatnonzero((end.forces > 0.0) | (gaps < INSIDE))
+        gaps = touching.gaps(end.pose, end.near)
+        closed = np.flatnonzero((end.forces[:, 0] > 0.0) | (gaps < INSIDE))
         if not len(closed):
             return after
-        work = (end.forces * (gaps - self._gaps(replace(end, x=begin.x, curve=course.before))[0]))[closed]
-        rows, pushed = rows[closed], h * end.forces[closed]
+        near, acting, forces = end.near.chosen(closed), end.acting.chosen(closed), end.forces[closed]
+        friction, gained = (
+            touching.friction(near),
+            touching.gaps(end.pose, acting) - touching.gaps(course.before, acting),
+        )
+        held, lengths = _listed(forces, friction), touching.rows(course.before, end.pose, acting, middle=True).lengths
+        work = held * np.concatenate([gained, touching.slips(course.before, end.pose, acting)])
+        rows = touching.rows(course.before, end.pose, near)
+        matrix, moving = rows.matrix(touching.lines), rows.along(self._full(drift, spins))
+        before = (matrix @ begin.w + moving)[: len(closed)]
+        back = np.zeros(len(held))
+        back[: len(closed)] = np.minimum(before, 0.0) * touching.restitution(near)
+        pushed = h * held * lengths
         found = self._rebounds(
-            self._bodies.coupled(solve, rows, rows),
-            rows @ w,
-            np.minimum(rows @ begin.w, 0.0) * self._restitution(end)[closed],
-            pushed,
-            work,
+            self._bodies.coupled(solve, matrix, matrix), matrix @ w + moving, back, pushed, work, friction
         )
         if found is None:
             return None
-        moved = solve(rows.T @ (found - pushed))
+        impulses, gain = found
+        moved = solve(matrix.T @ (impulses - pushed))
         moved[self.system.equations.unknowns :] = 0.0
         rates = self.system.rates(state, course.factors[1], moved[: self.system.equations.unknowns])[1]
-        lost = self._inertia.kinetic(v) - self._inertia.kinetic(v + rates) - float(work.sum())
-        told = self._named(end, closed, found)
-        return replace(after, v=v + rates, w=w + moved, lost=begin.lost + lost, pushed=told)
+        told = self._named(near, impulses, friction, rows)
+        return replace(after, v=v + rates, w=w + moved, lost=begin.lost - gain, **told)
+
+    def _drift(self, state: State, t: float, factors: Array) -> tuple[Array, Array]:
+        """Rates (quantities,) of what prescribed motions move, and angular velocities (rotations, turns) of what they
+        turn.
+        """
+        system = self.system
+        if not self._driven:
+            return np.zeros(system.layout.x), np.zeros((0, 0))
+        # Rates before the end of the step, as factors are.
+        unit, before = system.masses.time, np.nextafter(t, -np.inf)
+        rates = [0.0 if history is None else history.rate(before * unit) for history in system.histories]
+        faster, still = np.array(rates) * unit, np.zeros(system.equations.unknowns)
+        turned, turning = system.loading(factors).turn, system.loading(faster).turn
+        spins = quaternion.angular_velocity(turned, turning)[:, 3 - system.tables.width :]
+        fixed = system.model.rotations.kind == RotationFreedom.FIXED
+        return system.rates_in_time(state, factors, still, faster)[1], np.where(fixed[:, None], spins, 0.0)
+
+    def _full(self, rates: Array, spins: Array) -> Array:
+        """Rates by full coordinates."""
+        tables = self.system.tables
+        found = np.zeros(tables.full)
+        if self._driven:
+            found[: tables.of_places] = spins.ravel()
+            found[tables.of_places : tables.of_rows] = self._displaced(rates).ravel()
+        return found
 
     @staticmethod
-    def _rebounds(yielding: Sparse, speed: Array, back: Array, pushed: Array, work: Array) -> Array | None:
-        """Impulses (n,) of the whole step; None where none are found.
+    def _rebounds(
+        yielding: Sparse, speed: Array, back: Array, pushed: Array, work: Array, friction: Friction
+    ) -> tuple[Array, float] | None:
+        """Impulses (n,) of the whole step and what energy gains by it; None where none are found.
 
-        ``speed`` (n,) are rates of the gaps before those at its end, ``back`` those at its begin where they close times
-        the restitution, ``pushed`` the impulses within the step, and ``work`` (n,) what these did.
+        ``speed`` (n,) are rates of gaps and slips before those at its end, ``back`` those at its begin where gaps close
+        times the restitution, ``pushed`` the impulses within the step, and ``work`` (n,) what these did.
         """
         from scipy.sparse.csgraph import connected_components
 
+        impulses: Array
         count, cluster = connected_components(yielding, directed=False)
-        for k in range(HALVED + 1):
-            right = speed - yielding @ pushed + back
-            impulses = complementary(yielding, right, pushed)
+        kept, of_step = np.zeros(len(pushed)), np.zeros(len(pushed))
+        of_step[friction.along] = pushed[friction.along]
+        for k in range(HALVED + 2):
+            right = speed + yielding @ (kept - pushed) + back
+            found = complementary(yielding, right, pushed - kept, friction)
             # Once more from there, so that what makes it unique has no part in it.
-            impulses = None if impulses is None else complementary(yielding, right, impulses)
-            if impulses is None:
+            found = None if found is None else complementary(yielding, right, found, friction)
+            if found is None:
                 return None
+            impulses = kept + found
             change = impulses - pushed
             gained = work + 0.5 * change * (2.0 * speed + yielding @ change)
             total = np.bincount(cluster, weights=gained, minlength=count)
             size = np.bincount(cluster, weights=np.abs(work) + np.abs(change * speed), minlength=count)
-            grows = (total > GROWN * size)[cluster] & (back < 0.0)
-            if not grows.any():
+            rebounds = np.bincount(cluster, weights=back < 0.0, minlength=count) > 0.0
+            grows = (total > GROWN * size)[cluster]
+            halved = grows & (back < 0.0)
+            # Friction of the step that is not taken back takes energy away whatever comes after it.
+            stays = grows & ~rebounds[cluster] & (kept != of_step)
+            if not halved.any() and not stays.any():
                 break
-            back = np.where(grows, 0.0 if k == HALVED - 1 else 0.5 * back, back)
-        return impulses
-
-    def _restitution(self, end: _End) -> Array:
-        between, on = self._touching.rebounds
-        return np.concatenate([between[end.places.pairs], on[end.spots]])
+            back = np.where(halved, 0.0 if k >= HALVED - 1 else 0.5 * back, back)
+            kept = np.where(stays, of_step, kept)
+        return impulses, float(gained.sum())
 
     # -- names ----------------------------------------------------------------------------------------
 
-    def _named(self, end: _End, closed: Index, impulses: Array) -> dict[Any, float]:
-        """What has pushed, with its impulse."""
-        found, lines, places = dict[Any, float](), self._touching.lines, end.places
-        ones, others = lines.fractions(places.one), lines.fractions(places.other)
-        for k, impulse in zip(closed.tolist(), impulses.tolist(), strict=True):
-            if impulse <= 0.0:
-                continue
-            if k >= len(places):
-                found[self._touching.spots[end.spots[k - len(places)]]] = impulse
-                continue
-            pair = self._touching.nearby.pairs[places.pairs[k]]
-            e = [
-                int(along.elements[k] - lines.first[lines.owner[along.elements[k]]])
-                for along in (places.one, places.other)
-            ]
-            at = float(ones[k]), float(others[k])
-            key = Approach(
-                pair.contact, (pair.members[0], pair.members[1]), (e[0], e[1]), at, (True, True), pair.distance
-            )
-            found[key] = found.get(key, 0.0) + impulse
-        return found
+    def _named(self, near: Near, impulses: Array, friction: Friction, rows: Rows) -> dict[str, Any]:
+        """What has pushed, with its impulse; what friction has done, by name and in all."""
+        pushed, rubbed = dict[Any, float](), dict[Any, tuple[Array, bool]]()
+        keys = {k: self._key(near, k) for k in np.flatnonzero(impulses[: len(near)] > 0.0).tolist()}
+        for k, key in keys.items():
+            pushed[key] = pushed.get(key, 0.0) + impulses[k]
+        if not self._touching.rubs:
+            return {"pushed": pushed}
+        ways, most = rows.directions, friction.coefficients * impulses[friction.across]
+        sticks = np.linalg.norm(impulses[friction.along], axis=1) < (1.0 - STICKS) * most
+        for k, own, still in zip(friction.across.tolist(), friction.along, sticks.tolist(), strict=True):
+            if k in keys:
+                _add_rubbed(rubbed, {keys[k]: (impulses[own] @ ways[own], still)})
+        along = np.where(np.arange(len(impulses)) < len(near), 0.0, impulses)
+        return {"pushed": pushed, "rubbed": rubbed, "dragged": rows.of_forces(along, self.system.tables.full)}
+
+    def _key(self, near: Near, k: int) -> Spot | Approach:
+        """The name of something that is looked at."""
+        places, lines = near.places, self._touching.lines
+        if k >= len(places):
+            return self._touching.spots[near.spots[k - len(places)]]
+        pair, both = self._touching.nearby.pairs[places.pairs[k]], (places.one, places.other)
+        e = [int(along.elements[k] - lines.first[lines.owner[along.elements[k]]]) for along in both]
+        at = [float(lines.fractions(along.chosen(np.array([k])))[0]) for along in both]
+        return Approach(
+            pair.contact, (pair.members[0], pair.members[1]), (e[0], e[1]), (at[0], at[1]), (True, True), pair.distance
+        )
 
     def _refuse_inside(self, begin: Moving) -> None:
         """Refuse members that penetrate each other or obstacles at the begin."""
         touching = self._touching
-        curve = touching.lines.curve(begin.state.q, self._displaced(begin.x))
-        found = touching.nearby.found(curve, 0.0, ends=False)
-        gaps = touching.nearby.gaps(curve, found)
+        pose = self._pose(begin.state, begin.x)
+        found = touching.nearby.found(pose.curve, 0.0, ends=False)
+        gaps = touching.nearby.gaps(pose.curve, found)
         deep = gaps < -tolerances.CLOSED * self.system.model.scene.size / touching.unit
         for k in np.flatnonzero(deep).tolist():
             pair = touching.nearby.pairs[found.pairs[k]]
@@ -449,7 +494,7 @@ class Stepping(Integrator):
                 f"members {pair.members[0]!r} and {pair.members[1]!r} penetrate by {-gaps[k] * touching.unit:.3g} m"
             )
             raise SceneError(f"{detail} at t = 0, accepted: members that do not", ("contacts", pair.contact))
-        gaps = touching.on_obstacles(self._displaced(begin.x)).gaps
+        gaps = touching.on_obstacles(pose)
         for k in np.flatnonzero(gaps < -tolerances.CLOSED * self.system.model.scene.size / touching.unit).tolist():
             spot, deep_by = touching.spots[k], -gaps[k] * touching.unit
             message = f"found {spot.where} inside, by {deep_by:.3g} m at t = 0, accepted: members that begin outside"
@@ -461,6 +506,30 @@ INSIDE = 1e-10
 
 FAR = 10.0
 """Change in an iteration, rad or unit of length, at which Newton's method is given up."""
+
+
+STICKS = 1e-6
+"""Share of the largest force along surfaces by which it has to be smaller for what touches to be told as sticking."""
+
+
+def _listed(forces: Array, friction: Friction) -> Array:
+    """Forces (n, axes) as numbers: those across, then those along of what rubs."""
+    return np.concatenate([forces[:, 0], forces[friction.across, 1:].ravel()])
+
+
+def _arranged(listed: Array, friction: Friction, forces: Array) -> Array:
+    """The opposite of :func:`_listed`, as an array like some forces (n, axes)."""
+    found = np.zeros_like(forces)
+    found[:, 0] = listed[: len(forces)]
+    found[friction.across, 1:] = listed[friction.along]
+    return found
+
+
+def _add_rubbed(found: dict[Any, tuple[Array, bool]], more: Mapping[Any, tuple[Array, bool]]) -> None:
+    """Add impulses of friction to those of the same names; what does not stick everywhere does not."""
+    for key, (impulse, sticks) in more.items():
+        before = found.get(key)
+        found[key] = (impulse, sticks) if before is None else (before[0] + impulse, before[1] and sticks)
 
 
 def _owner(key: Spot | Approach) -> object:

@@ -1,6 +1,9 @@
-"""Linear complementarity: forces that only push, and gaps that do not become less than none.
+"""Linear complementarity: forces that only push, and gaps that do not become less than none; with friction as well.
 
     x >= 0,      A x + b >= 0,      x . (A x + b) = 0
+
+With friction further numbers ``y`` belong to one of ``x``, which may be at most ``mu x`` together, and the slips ``v``
+are further rows of ``A x + b``: ``y = - mu x v / |v|`` where ``v`` is not zero.
 
 With few forces, or where what they do to each other is no energy: pivots, all wrong signs at once and, where that goes
 round, Lemke's, which lead to a solution wherever ``A`` is of an energy, and mostly where it is not.
@@ -11,19 +14,25 @@ does not, an interior-point method leads to the solution in a number of steps th
 each other a small diagonal makes the solution unique.  It multiplies the change from a solution that is near, so that
 it has no part in where a sequence of such solutions ends.
 
+Coulomb's law is that ``y`` is the nearest to ``y - v`` that is allowed.  Newton's method for this equation begins with
+the solution of a problem like it, or with the one without friction; where it does not end, one contact after the other
+is solved by itself for some rounds before it is tried again.
+
 Source: Lemke 1965 (pivots); Judice and Pires 1994 (blocks of them); Cottle, Pang and Stone 2009, The Linear
 Complementarity Problem, sections 4.4 and 4.9; Kojima, Megiddo, Noma and Yoshise 1991, A unified approach to interior
 point algorithms for linear complementarity problems; Mehrotra 1992 (doi 10.1137/0802028); Rockafellar 1976 (proximal
-point).
+point); Alart and Curnier 1991 (friction as an equation); Jean 1999, The non-smooth contact dynamics method (rounds).
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
-from .arrays import TINY, Array, Sparse
+from .arrays import TINY, Array, Index, Sparse
 
-__all__ = ["by_pivots", "complementary"]
+__all__ = ["Friction", "by_pivots", "complementary"]
 
 YIELDING = 1e-7
 """Diagonal that is added, over the one that is there."""
@@ -53,11 +62,32 @@ column up to which a pivot is none.
 SHY = 0.99
 """Share of the way to where a number would be zero that a step of the interior-point method goes."""
 
+TRIES, ROUNDS = 12, 40
+"""How often Newton's method with friction is tried, and rounds over all contacts between two tries."""
 
-def complementary(matrix: Sparse, b: Array, near: Array) -> Array | None:
+
+@dataclass(frozen=True, eq=False)
+class Friction:
+    """What rubs: numbers (k,) of forces across among all, and (k, directions) of those along; coefficients (k,)."""
+
+    across: Index
+    along: Index
+    coefficients: Array
+
+    def __len__(self) -> int:
+        return len(self.across)
+
+    def scaled(self, lengths: Array) -> Friction:
+        """The same law where forces act along vectors of some lengths (n,)."""
+        along = lengths[self.along].mean(axis=1) if len(self) else lengths[:0]
+        return replace(self, coefficients=self.coefficients * lengths[self.across] / along)
+
+
+def complementary(matrix: Sparse, b: Array, near: Array, friction: Friction | None = None) -> Array | None:
     """The solution x (n,) that is nearest to ``near`` (n,), a solution of a problem like it; None where none is found.
 
-    ``matrix`` (n, n) has a symmetric part without negative eigenvalues.  What has no diagonal stays zero.
+    ``matrix`` (n, n) has a symmetric part without negative eigenvalues.  What has no diagonal stays zero.  With
+    ``friction`` some of the numbers are forces along surfaces.
 
     Examples
     --------
@@ -68,19 +98,37 @@ def complementary(matrix: Sparse, b: Array, near: Array) -> Array | None:
     from scipy.sparse import diags
 
     diagonal = matrix.diagonal()
+    if friction is not None and len(friction):
+        # Both directions along a surface have one unit, and none where nothing can push.
+        pushes = diagonal[friction.across] > NOTHING * diagonal.max(initial=TINY)
+        diagonal = diagonal.copy()
+        diagonal[friction.along] = np.where(pushes[:, None], diagonal[friction.along].mean(axis=1, keepdims=True), 0.0)
     able = np.flatnonzero(diagonal > NOTHING * diagonal.max(initial=TINY))
     unit = 1.0 / np.sqrt(diagonal[able])
     scaled = diags(unit) @ matrix[:, able][able] @ diags(unit) + YIELDING * diags(np.ones(len(able)))
     begin = near[able] / unit
     right = unit * b[able] - YIELDING * begin
     least = SOLVED * np.abs(right).max(initial=TINY)
-    x = _by_newton(scaled.tocsc(), right, begin, least)
-    x = _from_inside(scaled.tocsc(), right, least) if x is None else x
+    if friction is not None and len(friction):
+        place = np.full(len(b), -1, np.intp)
+        place[able] = np.arange(len(able))
+        rubs = place[friction.along[:, 0]] >= 0
+        across, along = place[friction.across[rubs]], place[friction.along[rubs]]
+        own = Friction(across, along, friction.coefficients[rubs] * unit[across] / unit[along[:, 0]])
+        x = _rough(scaled.tocsc(), right, begin, least, own)
+    else:
+        x = _smooth(scaled.tocsc(), right, begin, least)
     if x is None:
         return None
     found = np.zeros(len(b))
     found[able] = x * unit
     return found
+
+
+def _smooth(matrix: Sparse, b: Array, begin: Array, least: float) -> Array | None:
+    """The solution without friction."""
+    x = _by_newton(matrix, b, begin, least)
+    return _from_inside(matrix, b, least) if x is None else x
 
 
 def by_pivots(matrix: Array, b: Array) -> Array | None:
@@ -214,3 +262,119 @@ def _longest(x: Array, moved: Array, opening: Array, opened: Array) -> float:
     both, change = np.concatenate([x, opening]), np.concatenate([moved, opened])
     falls = change < 0.0
     return float(np.min(-both[falls] / change[falls], initial=1.0 / SHY))
+
+
+# -- friction ------------------------------------------------------------------------------------------
+
+
+def _rough(matrix: Sparse, b: Array, begin: Array, least: float, friction: Friction) -> Array | None:
+    """The solution with friction; None where none is found."""
+    found = _by_newton_with_friction(matrix, b, begin, least, friction)
+    if found is not None:
+        return found
+    across = np.setdiff1d(np.arange(len(b)), friction.along)
+    alone = _smooth(matrix[:, across][across].tocsc(), b[across], begin[across], least)
+    x = begin.copy()
+    if alone is not None:
+        x[:] = 0.0
+        x[across] = alone
+    rows = matrix.tocsr()
+    for _ in range(TRIES):
+        found = _by_newton_with_friction(matrix, b, x, least, friction)
+        if found is not None:
+            break
+        x = _one_by_one(rows, b, x, friction)
+    return found
+
+
+def _allowed(wished: Array, most: Array) -> Array:
+    """Forces (k, directions) nearest to those wished that are no larger than ``most`` (k,)."""
+    size = np.linalg.norm(wished, axis=1)
+    return wished * np.where(size > most, most / np.maximum(size, TINY), 1.0)[:, None]
+
+
+def _by_newton_with_friction(matrix: Sparse, b: Array, begin: Array, least: float, friction: Friction) -> Array | None:
+    """Newton's method on complementarity and Coulomb's law; None where it does not end soon."""
+    from scipy.sparse.linalg import splu
+
+    n, across, along, mu = len(b), friction.across, friction.along, friction.coefficients
+    width, normal = along.shape[1], np.setdiff1d(np.arange(n), along)
+    x = begin
+    for _ in range(2 * FEW):
+        opening = matrix @ x + b
+        wished, most = x[along] - opening[along], mu * np.maximum(x[across], 0.0)
+        missed = max(
+            float(np.abs(np.minimum(x[normal], opening[normal])).max(initial=0.0)),
+            float(np.abs(x[along] - _allowed(wished, most)).max(initial=0.0)),
+        )
+        if missed <= least:
+            x = x.copy()
+            x[normal] = np.maximum(x[normal], 0.0)
+            x[along] = _allowed(x[along], mu * x[across])
+            return x
+        pushes = np.zeros(n, bool)
+        pushes[normal] = x[normal] > opening[normal]
+        touches = pushes[across]
+        pushes[along] = touches[:, None]
+        chosen = np.flatnonzero(pushes)
+        x = np.zeros(n)
+        if not len(chosen):
+            continue
+        size = np.linalg.norm(wished, axis=1)
+        slides = np.flatnonzero(touches & (size > most))
+        way, share = wished[slides] / size[slides, None], most[slides] / size[slides]
+        # Where it slides: y - mu x way - share (the part of y - v across the way) = 0; else an opening vanishes.
+        turned = share[:, None, None] * (np.eye(width) - way[:, :, None] * way[:, None, :])
+        open_of = np.ones(n)
+        open_of[along[slides]] = 0.0
+        here = np.flatnonzero(open_of)
+        row, column = np.repeat(along[slides], width, axis=1), np.tile(along[slides], width)
+        parts = (here, here, np.ones(len(here))), (row.ravel(), column.ravel(), turned.ravel())
+        of_open = _matrix(parts, n)
+        parts = (
+            (row.ravel(), column.ravel(), (np.eye(width) - turned).ravel()),
+            (along[slides].ravel(), np.repeat(across[slides], width), -(mu[slides, None] * way).ravel()),
+        )
+        whole = (of_open @ matrix + _matrix(parts, n)).tocsc()
+        try:
+            x[chosen] = splu(whole[:, chosen][chosen]).solve(-(of_open @ b)[chosen])
+        except RuntimeError:
+            return None
+        if not np.isfinite(x).all():
+            return None
+    return None
+
+
+def _matrix(parts: tuple[tuple[Array, Array, Array], ...], size: int) -> Sparse:
+    """A square matrix of entries: rows, columns and values."""
+    from scipy.sparse import coo_matrix
+
+    rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return coo_matrix((values, (rows, columns)), shape=(size, size)).tocsr()
+
+
+def _one_by_one(matrix: Sparse, b: Array, begin: Array, friction: Friction) -> Array:
+    """Rounds over all contacts, each of which is solved by itself."""
+    x, where = begin.copy(), {int(row): k for k, row in enumerate(friction.across)}
+    stiff = [float(np.linalg.eigvalsh(_symmetric(matrix, own)).max(initial=TINY)) for own in friction.along]
+    diagonal, normal = matrix.diagonal(), np.setdiff1d(np.arange(len(b)), friction.along).tolist()
+
+    def opening(row: int) -> float:
+        begin, end = matrix.indptr[row : row + 2]
+        return float(matrix.data[begin:end] @ x[matrix.indices[begin:end]] + b[row])
+
+    for _ in range(ROUNDS):
+        for i in normal:
+            x[i] = max(0.0, x[i] - opening(i) / diagonal[i])
+            if i in where:
+                k = where[i]
+                own = friction.along[k]
+                wished = x[own] - np.array([opening(j) for j in own.tolist()]) / stiff[k]
+                x[own] = _allowed(wished[None], friction.coefficients[k : k + 1] * x[i])[0]
+    return x
+
+
+def _symmetric(matrix: Sparse, own: Index) -> Array:
+    """The symmetric part of a block on the diagonal."""
+    block = matrix[own][:, own].toarray()
+    return np.asarray(0.5 * (block + block.T))

@@ -17,7 +17,7 @@ from ..mathematics.arrays import Array, Index, Sparse
 from .segments import place_of_cut
 from .tables import Tables
 
-__all__ = ["Along", "Curve", "Lines"]
+__all__ = ["Along", "Curve", "Lines", "gained", "gathered", "moment_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class Lines:
     """
 
     def __init__(self, tables: Tables) -> None:
-        self._tables, model = tables, tables.model
+        self.tables, model = tables, tables.model
         self.model, self.axes = model, model.element.axes
         scene, mesh, points = model.scene, model.mesh, len(model.element.points)
         self.members = tuple(name for name in model.members if scene.members[name].type != "small")
@@ -111,7 +111,8 @@ class Lines:
         self._far = np.concatenate([[0.0], np.cumsum(self.length)])
         # Weights are polynomials of what goes from -1 to 1.
         powers = np.vander(2.0 * model.element.points - 1.0, increasing=True)
-        self._weights = np.linalg.inv(powers) / model.element.weights
+        self._lagrange = np.linalg.inv(powers)
+        self._weights = self._lagrange / model.element.weights
         self._bend()
 
     def _bend(self) -> None:
@@ -216,25 +217,65 @@ class Lines:
 
     def derivatives(self, curve: Curve, along: Along, directions: Array) -> Sparse:
         """Derivatives (n, total) of ``directions`` (n, axes) times the positions by the unknowns; directions stay."""
-        n, tables, weights = len(along), self._tables, self._reach(along)
+        return gathered(self.tables, *self.entries(curve, along, directions))
+
+    def entries(
+        self, curve: Curve, along: Along, directions: Array, moments: Array | None = None
+    ) -> tuple[Index, Array]:
+        """The same by full coordinates: their numbers (n, k) and the derivatives by them.
+
+        ``moments`` (n, points, turns) of points, of :meth:`shared` for instance, are added.
+        """
+        n, tables, weights = len(along), self.tables, self._reach(along)
         e = along.elements
-        arms = weights[..., None] * curve.tangents[e]
-        if self.model.space:
-            moments = np.cross(arms, directions[:, None, :])
-        else:
-            moments = (arms[..., 0] * directions[:, None, 1] - arms[..., 1] * directions[:, None, 0])[..., None]
+        turning = moment_of(weights[..., None] * curve.tangents[e], directions[:, None, :])
+        if moments is not None:
+            turning = turning + moments
         cells = [
             tables.place_cells(self._places[e]),
             (tables.width * self._turns[e][..., None] + np.arange(tables.width)).reshape(
                 n, tables.width * weights.shape[1]
             ),
         ]
-        values = [directions, moments.reshape(n, cells[1].shape[1])]
-        return gathered(tables, np.concatenate(cells, axis=1), np.concatenate(values, axis=1))
+        values = [directions, turning.reshape(n, cells[1].shape[1])]
+        return np.concatenate(cells, axis=1), np.concatenate(values, axis=1)
 
-    def of_places(self, places: Index, directions: Array) -> Sparse:
-        """As :meth:`derivatives` of the positions of places of the model, by their numbers (n,)."""
-        return gathered(self._tables, self._tables.place_cells(places), directions)
+    def shared(self, along: Along, moments: Array, gain: Array | None = None) -> Array:
+        """Moments (n, points, turns) of points for moments (n, turns) on sections.
+
+        With ``gain`` (n, points, turns), what points have turned since a state, they are the derivatives by further
+        rotation vectors of the work of these moments on the turns of sections.
+        """
+        found = (self._powers(along) @ self._lagrange)[..., None] * moments[:, None, :]
+        if gain is None:
+            return np.asarray(found)
+        half = 0.5 * gain
+        along_it = half * np.einsum("npa,npa->np", half, found)[..., None]
+        return np.asarray(found + along_it + (np.cross(half, found) if self.model.space else 0.0))
+
+    def turned(self, before: Array, after: Array, along: Along) -> Array:
+        """Rodrigues vectors (n, points, turns) by which points turn between rotations (rotations, components)."""
+        own = self._turns[along.elements]
+        return gained(before[own], after[own])
+
+    def of_sections(self, along: Along, points: Array) -> Array:
+        """Those of sections (n, turns) from those of points (n, points, turns)."""
+        return np.asarray(np.einsum("np,npa->na", self._powers(along) @ self._lagrange, points))
+
+
+def moment_of(arms: Array, forces: Array) -> Array:
+    """Moments (..., turns) of forces (..., axes) at arms (..., axes)."""
+    if arms.shape[-1] == 3:
+        return np.asarray(np.cross(arms, forces))
+    return np.asarray(arms[..., :1] * forces[..., 1:] - arms[..., 1:] * forces[..., :1])
+
+
+def gained(before: Array, after: Array) -> Array:
+    """Rodrigues vectors (..., turns) from rotations (..., components) to others."""
+    if before.shape[-1] == 1:
+        return 2.0 * np.tan(0.5 * (after - before))
+    turned = quaternion.multiply(after, quaternion.conjugate(before))
+    return np.asarray(2.0 * turned[..., 1:] / turned[..., :1])
 
 
 def gathered(tables: Tables, cells: Index, values: Array) -> Sparse:
