@@ -353,7 +353,7 @@ class Stepping(Integrator):
         """The state after the impulses at the end of a step; None where none are found."""
         begin, h, state, touching = course.begin, course.h, end.state, self._touching
         v = 2.0 * (end.x - begin.x) / h - begin.v
-        drift, spins = self._drift(state, begin.t + h, course.factors[1])
+        drift, spins = self._drift(state, begin.t + h)
         solve, momenta = self._equations.massive(state, course.factors[1], v - drift)
         w = solve(momenta)
         after = Moving(begin.t + h, state, end.x, v, w, begin.lost, dragged=np.zeros(self._dragging))
@@ -372,7 +372,7 @@ class Stepping(Integrator):
         work = held * np.concatenate([gained, touching.slips(course.before, end.pose, acting)])
         rows = touching.rows(course.before, end.pose, near)
         matrix, moving = rows.matrix(touching.lines), rows.along(self._full(drift, spins))
-        before = (matrix @ begin.w + moving)[: len(closed)]
+        before = (matrix @ begin.w + rows.along(self._full(*self._drift(begin.state, begin.t))))[: len(closed)]
         back = np.zeros(len(held))
         back[: len(closed)] = np.minimum(before, 0.0) * touching.restitution(near)
         pushed = h * held * lengths
@@ -388,17 +388,15 @@ class Stepping(Integrator):
         told = self._named(near, impulses, friction, rows)
         return replace(after, v=v + rates, w=w + moved, lost=begin.lost - gain, **told)
 
-    def _drift(self, state: State, t: float, factors: Array) -> tuple[Array, Array]:
+    def _drift(self, state: State, t: float) -> tuple[Array, Array]:
         """Rates (quantities,) of what prescribed motions move, and angular velocities (rotations, turns) of what they
         turn.
         """
         system = self.system
         if not self._driven:
             return np.zeros(system.layout.x), np.zeros((0, 0))
-        # Rates before the end of the step, as factors are.
-        unit, before = system.masses.time, np.nextafter(t, -np.inf)
-        rates = [0.0 if history is None else history.rate(before * unit) for history in system.histories]
-        faster, still = np.array(rates) * unit, np.zeros(system.equations.unknowns)
+        unit, factors, still = system.masses.time, system.factors(t), np.zeros(system.equations.unknowns)
+        faster = np.array([0.0 if history is None else history.rate(t * unit) * unit for history in system.histories])
         turned, turning = system.loading(factors).turn, system.loading(faster).turn
         spins = quaternion.angular_velocity(turned, turning)[:, 3 - system.tables.width :]
         fixed = system.model.rotations.kind == RotationFreedom.FIXED
