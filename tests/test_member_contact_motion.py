@@ -8,6 +8,8 @@ from scipy.integrate import solve_ivp
 
 from sfetcas import Scene, SceneError, SolveError, solve
 from sfetcas.contact.closest import Closest
+from sfetcas.dynamics.events import Events
+from sfetcas.errors import Status
 from sfetcas.mechanics.clearances import Clearance
 from sfetcas.mechanics.elements import Element
 from sfetcas.mechanics.terms import rotation_gradient, rows_of
@@ -49,6 +51,15 @@ def across(at, height=0.1, angle=0.5 * np.pi):
 def gaps(motion, name="pair"):
     found = [np.min(step.contacts[name]["gap"]) for step in motion.steps]
     return np.array(found)
+
+
+def test_a_motion_that_is_not_followed_says_what_follows_it(monkeypatch):
+    def lost(self, taken, share):
+        raise SolveError(Status.STOPPED, "no event could be located", taken.begin)
+
+    monkeypatch.setattr(Events, "advanced", lost)
+    with pytest.raises(SolveError, match=r"no event could be located; members that lie along .* 'stepping'"):
+        solve(bars(across(0.3)))
 
 
 @pytest.mark.fast

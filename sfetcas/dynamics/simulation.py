@@ -191,7 +191,8 @@ class Simulation:
         self.seconds["build"] += time.perf_counter() - built
         mover = Mover(equations, Inertia(system), masses.time, system.factors)
         begun, notes = self.begun(system, mover.free if len(unilateral) else None)
-        if any(contact.between_members for contact in self.scene.contacts.values()) and not stepping:
+        meeting = any(contact.between_members for contact in self.scene.contacts.values()) and not stepping
+        if meeting:
 
             def with_rows(approaches: tuple[Approach, ...]) -> StageEquations:
                 near = assemble(self.scene, replace(mesh, approaches=approaches), assembly="nodal")
@@ -227,6 +228,8 @@ class Simulation:
                 check_resisted(equations, _resistance(system, begun))
             elif self.weightless and error.status is Status.STOPPED:
                 error = SolveError(error.status, f"{error.detail}; {SNAPS}", error.last)
+            elif meeting and error.status is Status.STOPPED:
+                error = SolveError(error.status, f"{error.detail}; {ALONG}", error.last)
             run.failure = error
         beyond = run.failure is not None and run.failure.status in LIMITS
         if not beyond and (watch is None or not watch.ended):
@@ -590,6 +593,9 @@ def _resistance(system: StageEquations, begun: InitialState) -> Array:
     stiffness, mass, _, _ = _Beginning(system)(begun.state, np.zeros(layout.lam), np.zeros(layout.factors))
     return np.asarray(stiffness + mass)
 
+
+ALONG = "members that lie along each other, or touch at many places, are followed by the integrator 'stepping'"
+"""What else to say where members that touch each other are not followed event by event."""
 
 SNAPS = (
     "a flexible member without mass has no motion of its own: where it is drawn straight, or snaps, it would have to "
