@@ -18,7 +18,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Point, State
 from ..mechanics.fields import transferred
-from ..mechanics.mesh import ContactPoint
+from ..mechanics.mesh import ContactPoint, Mesh
 from ..solvers.between_states import turned_between
 from ..solvers.deflation import deflated
 from ..solvers.newton import Balance, Iterate, Limits, correct
@@ -42,6 +42,9 @@ SHORTEST, LONGER = 0.05, 1.5
 
 INSIDE = 1.01
 """How far obstacles are drawn back, over how deep a state is inside."""
+
+HOLDING = 100.0
+"""Drag that holds a state until it is known how hard it is pushed."""
 
 DRAG, MOST_DRAG, BEYOND = 1.0, 1e6, 4.0
 """First and largest drag of the way downhill, and drag over what makes a step unique."""
@@ -209,6 +212,8 @@ def brought_in(run: MemberContact, source: Solved, way: Way) -> Solved | None:
             closest.draw_back(deep * (1.0 - ahead))
             points = tuple(replace(p, distance=closest.pairs[p.pair].distance) for p in points)
             there = run.resolved(mesh, points, now, way)
+            if there is None and points and now is source:
+                there = _held_back(run, mesh, points, now, way)
             if there is None or run.turned(now.fields, there.fields) > run.stride:
                 step, run.lines.keys = 0.5 * step, lines
                 if step < SHORTEST or not deep:
@@ -219,6 +224,12 @@ def brought_in(run: MemberContact, source: Solved, way: Way) -> Solved | None:
     finally:
         closest.draw_back(0.0)
     return now
+
+
+def _held_back(run: MemberContact, mesh: Mesh, points: Points, now: Solved, way: Way) -> Solved | None:
+    """What is near to a state, from where it comes to with drag: there it is known how hard and where points push."""
+    there = run.resolved(mesh, points, now, way, HOLDING)
+    return None if there is None else run.resolved(replace(there.model.mesh, points=()), points_of(there), there, way)
 
 
 def _resultants(run: MemberContact, source: Solved) -> Points:
