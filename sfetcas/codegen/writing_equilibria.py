@@ -42,7 +42,10 @@ class EquilibriumWriter(Writer):
             found += [program.merit, program.convex]
         if solver.margins is not None:
             found.append(solver.margins)
-        found.append(_pivots() if self.model.has_potential else program.linear)
+        if self.model.has_potential:
+            found.append(_pivots())
+        if solver.method.pivoted:
+            found.append(program.linear)
         return [*found, solver.sensitivities] if self._sensitivities else found
 
     @property
@@ -137,6 +140,7 @@ class EquilibriumWriter(Writer):
             "MOMENT": moments.start,
             "MOMENTS": moments.stop - moments.start,
             "SYMMETRIC": int(self.model.has_potential),
+            "PIVOTED": int(solver.method.pivoted),
             "MINIMISABLE": int(self.model.minimisable),
             "DOWNHILL": int(self.model.downhill),
             "SLIDING": self.model.mesh.sliding,

@@ -78,7 +78,7 @@ class Kept:
         fixed: Collection[str],
         rest: Solved,
     ) -> None:
-        self.scene, self.rest = scene, rest
+        self.scene, self.rest, self.accuracy = scene, rest, accuracy
         self.run = run = MemberContact(scene, prepare, accuracy, fixed)
         self.closest = run.closest
         points = points_of(rest)
@@ -93,6 +93,19 @@ class Kept:
     def sticks(self) -> bool:
         """Whether there are places that stick."""
         return any(point.grip is not None for point in self.single)
+
+    @functools.cached_property
+    def mesh(self) -> Mesh:
+        """The mesh with what touches where it does; on lines as it was found, with ends that slide."""
+        on_lines = [point for point in points_of(self.rest) if point.pair in self.run.lines.keys]
+        mesh = self.rest.model.mesh if on_lines else replace(self.rest.model.mesh, cuts=self.cuts())
+        return replace(mesh, points=tuple(self.run.lines.set_out(mesh, [*self.single, *on_lines])))
+
+    def halved(self) -> Solved | None:
+        """The same on half as long elements, but for those so short that they gain nothing; None if it is lost."""
+        mesh = replace(self.rest.model.mesh.refined(self.run.lines.long(self.rest)), points=())
+        points = self.run.lines.points_on(mesh, self.rest)
+        return self.run.resolved(mesh, points, self.rest, lambda model: model.loading(self.rest.factor))
 
     # -- on another mesh --------------------------------------------------------------------------
 
@@ -225,6 +238,8 @@ class Kept:
                 slopes = self.closest.slopes(fields, point.pair, point.at)[list(point.slides)]
                 if np.abs(slopes).max() > NEAREST:
                     yield f"contacts.{point.contact} is nearer beside {_places(point)}"
+                elif point.pair in self.stretches and self._ends_beside(point):
+                    yield f"contacts.{point.contact} touches {point.members[0]} from or up to within an element"
         for near in self.closest.found(fields, 0.0):
             if near.gap < -self.run.tolerance and not self._known(near):
                 yield _where(near)
@@ -236,6 +251,21 @@ class Kept:
                 yield f"members {' and '.join(map(repr, members))} lie along each other (contacts.{contact})"
             elif self.scene.rubs or smooth:
                 yield f"member {members[0]!r} lies along contacts.{contact}{' beside friction' * self.scene.rubs}"
+
+    def _ends_beside(self, point: ContactPoint) -> bool:
+        """Whether a line ends so far from where elements do that what presses between is no single force there."""
+        (member,), (at,), mesh, scales = point.members, point.at, self.rest.model.mesh, self.rest.model.scales
+        cuts, cut, lines = mesh.cuts[member], mesh.cut_at(member, at), self.run.lines
+        unit = self.scene.center_lines[member].length / scales.length
+        pressure = dict[int, float]()
+        for p in mesh.points:
+            pair, element = lines.element_of(mesh, p) or (None, -1)
+            if pair == point.pair and element in (cut - 1, cut):
+                push = self.rest.fields.contact_point(p)["push"] / scales.force
+                pressure[element] = pressure.get(element, 0.0) + push / (unit * (cuts[element + 1] - cuts[element]))
+        # The moment that this misses bends what is beyond.
+        missed = 0.5 * max(pressure.values(), default=0.0) * (unit * (at - cuts[cut])) ** 2
+        return bool(missed > self.accuracy * self.rest.fields.stiffness(member, at))
 
     def _flattens(self, point: ContactPoint) -> bool:
         """Whether a point is where the gap does not grow beside it, of what may bend."""

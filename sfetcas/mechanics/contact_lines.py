@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import casadi as ca
 import numpy as np
@@ -294,7 +294,7 @@ def tangential_at(parts: Parts, point: ContactPoint, gap: Term, data: Array, car
 
 
 def pressed_along(
-    parts: Parts, point: ContactPoint, gap: Term, ways: list[Array], origin: Array, carrier: Carrier
+    parts: Parts, point: ContactPoint, gap: Term, ways: list[Array], origin: Array, distance: Any, carrier: Carrier
 ) -> Iterator[One]:
     """Terms of one end of elements on a line.
 
@@ -308,6 +308,8 @@ def pressed_along(
         Directions that belong to the data of that.
     origin : ndarray (3,)
         Place of the obstacle, m.
+    distance : float
+        From it, or the plane, to the centre line, m.
     carrier : Carrier
         What carries it.
     """
@@ -335,7 +337,7 @@ def pressed_along(
             parts.beams.compliance[number].ravel(),
             ((line.positions(x) - origin)[:, :axes] / unit).ravel(),
             *(way[:axes] for way in ways),
-            np.array([point.distance / unit, share]),
+            numbers([distance / unit, share]),
             own.ravel(),
             carrier.arm[:axes] / unit,
         ]

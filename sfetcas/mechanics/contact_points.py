@@ -355,7 +355,8 @@ def _of_line(parts: Parts, point: ContactPoint) -> Iterator[One]:
     gap, ways = _gap(parts.scene, replace(point, normal=normal), space)
     # What is held, means, is not turned.
     gap = replace(gap, carried=False)
-    yield from pressed_along(parts, point, gap, ways, stop.place, carrier_of(parts, point.contact))
+    distance, carrier = _distance(parts.scene, point), carrier_of(parts, point.contact)
+    yield from pressed_along(parts, point, gap, ways, stop.place, distance, carrier)
     axes = parts.element.axes
     data = np.concatenate([np.eye(axes)[0], np.zeros(axes + 1)])
     yield _held(parts, point, Gap(space, True), data, np.zeros(3), [])

@@ -92,7 +92,7 @@ class Fields:
         """
         carried = self._equations.segment_pulls(self.state.lam, self._loading)[self.model.segments.owner]
         pull = self._loading.pull + (carried + self._strings + self._ringed)[:, None, :]
-        if any(point.line for point in self.model.mesh.points):
+        if self.model.mesh.lies:
             # Elements on lines begin at places, so that none carries what presses on others.
             pull = pull + pull_within(self._pressing, self.model.element)
         return np.asarray(pull)
@@ -207,8 +207,7 @@ class Fields:
     @functools.cached_property
     def _spread(self) -> Array:
         """Forces along the elements, at their points (elements, points, axes): loads, and what presses along lines."""
-        lines = [point for point in self.model.mesh.points if point.line]
-        return self._loading.spread + self._pressing if lines else self._loading.spread
+        return self._loading.spread + self._pressing if self.model.mesh.lies else self._loading.spread
 
     @functools.cached_property
     def _pressing(self) -> Array:

@@ -351,6 +351,11 @@ class Mesh:
         return sum(sum(point.slides) for point in self.points if not point.edge)
 
     @property
+    def lies(self) -> bool:
+        """Whether a member lies along an obstacle."""
+        return any(point.line for point in self.points)
+
+    @property
     def elements(self) -> int:
         """Number of elements of all members."""
         return sum(len(cuts) - 1 for cuts in self.cuts.values())

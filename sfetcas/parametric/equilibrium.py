@@ -226,7 +226,7 @@ def equilibrium_solver(
     if scene.analysis.type == "modes":
         message = "found 'modes', accepted: static or path, whose equilibria are exported, or dynamic"
         raise SceneError(message, ("analysis", "type"))
-    mesh, assembly, answer = asked_mesh(scene, settings or Settings())
+    mesh, assembly, answer = asked_mesh(scene, settings or Settings(), lines=not watched)
     base = assemble(scene, mesh, assembly=assembly)
     prepared = Prepared(base)
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
@@ -305,8 +305,8 @@ def refuse_search(
         raise SceneError(f"turning axes are {lacking}, {instead}", ("rotating",))
 
 
-def asked_mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium]:
-    """The mesh that the accuracy requires, the assembly, and the static answer.
+def asked_mesh(scene: Scene, settings: Settings, *, lines: bool = False) -> tuple[Mesh, Any, Equilibrium]:
+    """The mesh that the accuracy requires, the assembly, and the static answer; ``lines`` as of :func:`touching_mesh`.
 
     Raises
     ------
@@ -320,7 +320,8 @@ def asked_mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium
     except SolveError as error:
         raise SceneError(f"the scene itself has no equilibrium: {error}, accepted: one that has") from None
     if scene.contacts:
-        return touching_mesh(still, settings, solution.last), solution.last.model.assembly, solution.last
+        mesh = touching_mesh(still, settings, solution.last, lines=lines)
+        return mesh, solution.last.model.assembly, solution.last
     model = max((step.model for step in solution.steps), key=lambda one: one.mesh.elements)
     asked = [settings.elements or member.elements for member in scene.members.values() if member.type == "flexible"]
     # Tendons with friction are pulled or let out as at the first step.
@@ -334,19 +335,19 @@ def asked_mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium
     return mesh, model.assembly, solution.last
 
 
-def touching_mesh(scene: Scene, settings: Settings, answer: Equilibrium) -> Mesh:
+def touching_mesh(scene: Scene, settings: Settings, answer: Equilibrium, *, lines: bool) -> Mesh:
     """The mesh of an answer of statics with what touches where it does, also where places roll over nodes.
 
     Raises
     ------
     SceneError
-        Members lie along something.
+        Members lie along each other, or beside friction; without ``lines`` also along obstacles.
     """
     kept = kept_of(scene, settings, solved_from(answer))
-    for what in kept.lines(smooth=True):
-        raise SceneError(f"{what}, accepted: members that touch at places", ("contacts",))
-    mesh = replace(answer.model.mesh, cuts=kept.cuts())
-    return replace(mesh, points=kept.points(mesh))
+    for what in kept.lines(smooth=not lines):
+        accepted = "members that touch at places" + ", or lie along obstacles without friction" * lines
+        raise SceneError(f"{what}, accepted: {accepted}", ("contacts",))
+    return kept.mesh
 
 
 def kept_of(scene: Scene, settings: Settings, found: Solved) -> Kept:
@@ -364,8 +365,7 @@ def in_contact(kept: Kept, model: Model) -> State:
 
     Places begin elsewhere along their members there, and units may be others.
     """
-    scene, mesh = kept.scene, model.mesh
-    points = kept.points(mesh)
+    scene, mesh, points = kept.scene, model.mesh, kept.mesh.points
     state = kept.start(kept.run.prepare(replace(mesh, points=points)))
     y, number = state.y.copy(), {name: i for i, name in enumerate(model.positions.unknowns)}
     unit, target = kept.rest.model.scales, model.scales
@@ -375,6 +375,8 @@ def in_contact(kept: Kept, model: Model) -> State:
             if point.slides[side]:
                 moved = (now.at[side] - point.at[side]) * scene.center_lines[member].length
                 y[number[f"{point.place(side)}, arc length"]] += moved / unit.length
+        if point.line:
+            continue
         for k in range(model.element.axes):
             y[number[f"{point.between}, {'xyz'[k]}"]] += (here - there)[k] / unit.length
     return replace(state, y=y * unit.length / target.length, lam=state.lam * unit.force / target.force)

@@ -35,7 +35,7 @@ from ..mechanics.stationarity import Stationarity
 from ..mechanics.stations import Stations
 from ..mechanics.tendon_chains import part_of
 from ..mechanics.tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
-from ..mechanics.terms import answers_of
+from ..mechanics.terms import Group, answers_of
 from ..solvers.program import Program
 
 __all__ = ["Outputs", "Result", "Results", "default_motion_results", "default_results"]
@@ -680,7 +680,32 @@ class Outputs:
     def _spread(self) -> tuple[ca.MX, ca.MX, ca.MX]:
         """Distributed forces at the points of all elements, the whole pull there (axes, points), couples of loads."""
         spread, pull, torque = spread_of(self._expressions, self._q, self._y, self._program.given)
-        return spread, self._found.pull + pull + self._on_points(self._found.strings + self._found.along), torque
+        pull = self._found.pull + pull + self._on_points(self._found.strings + self._found.along)
+        if not self._pressed:
+            return spread, pull, torque
+        n, element = self._expressions.points, self._model.element
+        pressed = ca.MX.zeros(self._expressions.axes, n * self._expressions.elements)
+        for group, forces in self._pressed:
+            points = (n * group.elements[:, None] + np.arange(n)).ravel()
+            onto = sparse(np.arange(len(points)), points, np.ones(len(points)), (len(points), pressed.shape[1]))
+            pressed += ca.mtimes(forces[: self._expressions.axes, :], onto)
+        # Elements on lines begin at places, so that none carries what presses on others.
+        within = np.kron(np.eye(self._expressions.elements), element.to_points / element.weights)
+        return spread + pressed, pull - ca.mtimes(pressed, ca.sparsify(ca.DM(within))), torque
+
+    @functools.cached_property
+    def _pressed(self) -> list[tuple[Group, ca.MX]]:
+        """Groups of terms that tell what presses along lines, and that at the points of their elements, one after the
+        other, (3, points of all), dimensionless.
+        """
+        expressions, model, found = self._expressions, self._model, list[tuple[Group, ca.MX]]()
+        for number, group in enumerate(model.terms):
+            if group.kind.table == "contacts" and any(key.startswith("push x at") for key in group.kind.answers):
+                sides = expressions.arguments(number, self._q, self._places, self._program.given, self._unwrapped)
+                lam = expressions.multipliers(number, self._lam)
+                told = expressions.many(answers_of(group.kind), len(group.data))(*sides, lam)
+                found.append((group, ca.reshape(told, 3, -1)))
+        return found
 
     def _on_points(self, values: ca.MX) -> ca.MX:
         """What is the same all along each element, (axes, elements), at its points."""
@@ -866,7 +891,13 @@ class Outputs:
         return self.place(points[0], 0) if len(points) == 1 else ca.MX(np.nan)
 
     def _force_at(self, point: ContactPoint) -> ca.MX:
-        """Force (3,), N, at a place that touches on the first member."""
+        """Force (3,), N, at a place that touches on the first member, or of what stands for a part of a line."""
+        if point.line:
+            n, total = self._expressions.points, ca.MX.zeros(3)
+            for group, forces in self._pressed:
+                own = np.flatnonzero(np.array(group.names) == point.name)
+                total += ca.sum2(forces[:, (n * own[:, None] + np.arange(n)).ravel().tolist()])
+            return total * self._model.scales.force
         return ca.vertcat(*[self._connection("contacts", point.name, f"force {axis}") for axis in "xyz"])
 
     def push(self, point: ContactPoint) -> ca.MX:

@@ -75,8 +75,8 @@ def parametric(
     Raises
     ------
     SceneError
-        A scene with friction where members touch, lines of contact, or rotating axes; a number or an answer that it
-        does not have; a number that changes the structure of the model.
+        A scene with friction where members touch, members that lie along each other, or rotating axes; a number or an
+        answer that it does not have; a number that changes the structure of the model.
     """
     check_scene(scene, "parametric({}, ...)", steps=False)
     parameters = [parameters] if isinstance(parameters, str) else parameters
@@ -245,6 +245,7 @@ class ParametricEquilibrium:
                 return answer
         solver, state = touching.anew(numbers)
         if solver not in touching.equilibria:
+            touching.forget_lines()
             own = self if solver is self.solver else replace(self, solver=replace(solver, start=state, begun=numbers))
             touching.equilibria[solver] = own
         of = touching.equilibria[solver]
@@ -432,8 +433,11 @@ class ParametricAnswer:
         SceneError
             There are more or fewer weights.
         SolveError
-            The equilibrium is singular.
+            The equilibrium is singular, or a member lies along an obstacle.
         """
+        if self.of.solver.model.mesh.lies:
+            detail = "second derivatives are not known where a member lies along an obstacle"
+            raise SolveError(Status.FAILED, f"{detail}, accepted: differences of first ones", self.outcome)
         given = np.asarray(weights, dtype=float).ravel()
         size = self.of.solver.results.size
         if len(given) != size:
@@ -470,6 +474,18 @@ class ParametricAnswer:
         SolveError
             The finer mesh has no equilibrium nearby.
         """
+        solver = self.of.solver
+        program, state = self._halved() if self.of.touching is None else self._halved_touching(self.of.touching)
+        given = program.given_of(program.model.loading(self.of.scene_at(self.values).analysis.steps[-1]))
+        names = [one.name for one in self.of.answers]
+        results = Results(program.model, names, solver.results.places, unique=solver.unique)
+        outputs = results.expression(program, ca.MX(ca.DM(results.rest(program.model))))
+        function = ca.Function("outputs", [program.state_symbol, program.symbol], [outputs])
+        there = solver.by_name(np.array(function(state, given)).ravel())
+        return {name: float(np.abs(there[name] - own).max(initial=0.0)) for name, own in self.answers.items()}
+
+    def _halved(self) -> tuple[Program, Array]:
+        """The program on half as long elements, and the state (states,) there."""
         solver, model = self.of.solver, self.of.solver.model
         scene = solver.arguments.scene_at(self.numbers)
         assembly: Any = model.assembly
@@ -480,11 +496,15 @@ class ParametricAnswer:
         outcome = Globalised(program, Prepared(finer).weight, solver.rules)(given, program.flat(start))
         if outcome.code not in SOLVED:
             raise SolveError(Status.FAILED, f"on half the elements: {MEANINGS[outcome.code]}", outcome)
-        results = Results(finer, [one.name for one in self.of.answers], solver.results.places, unique=solver.unique)
-        outputs = results.expression(program, ca.MX(ca.DM(results.rest(finer))))
-        function = ca.Function("outputs", [program.state_symbol, program.symbol], [outputs])
-        there = solver.by_name(np.array(function(outcome.state, given)).ravel())
-        return {name: float(np.abs(there[name] - own).max(initial=0.0)) for name, own in self.answers.items()}
+        return program, outcome.state
+
+    def _halved_touching(self, touching: Touching) -> tuple[Program, Array]:
+        """As :meth:`_halved`, where what touches may have to be found anew."""
+        found = touching.kept(self.of.solver, self.numbers, self.outcome.state).halved()
+        if found is None:
+            raise SolveError(Status.FAILED, "what touches was not found on half the elements", self.outcome)
+        program = Program(Expressions(Equations(found.model, kernels="interpreted"), "interpreted"))
+        return program, program.flat(found.state)
 
     def certified(self) -> Equilibrium:
         """The equilibrium that :func:`~sfetcas.solve` finds for the same values, with its own mesh, branch and

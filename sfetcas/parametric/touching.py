@@ -1,6 +1,6 @@
-"""Equilibria as functions of parameters where members touch obstacles or each other at places.
+"""Equilibria as functions of parameters where members touch obstacles or each other.
 
-With the places that touch an equilibrium is one of a model like any other.  For other numbers they are kept; then it is
+With what touches an equilibrium is one of a model like any other.  For other numbers they are kept; then it is
 looked whether they all push, and nothing else touches.  Where that is not so what touches is found anew, as statics
 finds it for these numbers, and has a solver of its own.
 """
@@ -69,19 +69,24 @@ class Touching:
         Raises
         ------
         SolveError
-            Statics finds no equilibrium, or one in which members lie along something.
+            Statics finds no equilibrium, or one in which members lie along each other.
         """
         scene = self.first.arguments.scene_at(numbers)
         static = scene.analysis.model_copy(update={"type": "static", "equilibria": "one"})
         scene = scene.model_copy(update={"analysis": static})
         answer = solve(scene, self.settings).last
         try:
-            mesh = touching_mesh(scene, self.settings, answer)
+            mesh = touching_mesh(scene, self.settings, answer, lines=True)
         except SceneError as error:
             raise SolveError(Status.FAILED, error.bare, answer.state) from None
         solver = self._solver(mesh)
         begun = in_contact(kept_of(scene, self.settings, solved_from(answer)), solver.model)
         return solver, solver.arguments.program.flat(begun)
+
+    def forget_lines(self) -> None:
+        """Forget the solvers of lines, which end elsewhere for each number, but for the first."""
+        for solver in [one for one in self.equilibria if one.model.mesh.lies]:
+            del self.equilibria[solver]
 
     def _solver(self, mesh: Mesh) -> EquilibriumSolver:
         """The solver in which the same touches, on whatever mesh."""

@@ -89,9 +89,10 @@ class Rules:
         Largest rotation of a node in a downhill step under forces, rad; with moments there is no limit.
     near : float
         Newton steps shorter than this, rad, are taken without line search.
-    proximal, soft : float
+    proximal, soft, hard : float
         Primal regularisation, share of the weight; further regularisation of displacements (primal) and rows (dual) in
-        the factors only, whose effect iterative refinement removes.
+        the factors only, whose effect iterative refinement removes; the same in factors with pivots where members lie
+        along obstacles: forces at the ends of a short element bend it hardly more than none.
     firm, firmer : float
         First shift that makes the matrix positive, share of the weight; factor by which it grows.
     rounds : int
@@ -126,6 +127,7 @@ class Rules:
     near: float = 0.05
     proximal: float = field(default_factory=lambda: tolerances.PROXIMAL)
     soft: float = field(default_factory=lambda: tolerances.SOFT)
+    hard: float = field(default_factory=lambda: tolerances.DUAL)
     firm: float = 1e-3
     firmer: float = 10.0
     rounds: int = 8
@@ -199,6 +201,8 @@ class Globalised:
         mode.
     diagonal : ndarray (total,)
         Positions of the diagonal among the entries of the matrix.
+    pivoted : bool
+        Whether systems are solved by factors with pivots.
     """
 
     def __init__(
@@ -230,6 +234,8 @@ class Globalised:
         # Large vectors stay in CasADi's type between functions: conversion costs more than most of these calls.
         self._made_firm = self._firmness()
         self._symmetric = program.model.has_potential
+        # Where a line ends the Lagrangian has no curvature along the member: there is no order without small pivots.
+        self.pivoted = not self._symmetric or program.model.mesh.lies
         self._sliding = program.model.mesh.sliding
         if self._symmetric and self._total:
             self._solver = ca.Linsol("globalised", "ldl", program.sparsity)
@@ -239,33 +245,37 @@ class Globalised:
     # -- linear algebra -----------------------------------------------------------------------------
 
     def _firmness(self) -> ca.Function:
-        """(entries, firm) -> entries with their diagonal shifted, and the matrix of these that is factorised."""
+        """(entries, firm, soft) -> entries with their diagonal shifted, and the matrix of these that is factorised."""
         entries, firm = ca.MX.sym("entries", self.program.sparsity.nnz()), ca.MX.sym("firm")
+        share = ca.MX.sym("soft")
         diagonal = self.diagonal.tolist()
         target = ca.MX(entries)
         target[diagonal] = target[diagonal] + (self.rules.proximal + firm) * ca.DM(self.mass)
         soft = ca.MX(target)
-        soft[diagonal] = soft[diagonal] + self.rules.soft * ca.DM(self.soft)
-        return ca.Function("firmness", [entries, firm], [target, ca.MX(self.program.sparsity, soft)])
+        soft[diagonal] = soft[diagonal] + share * ca.DM(self.soft)
+        return ca.Function("firmness", [entries, firm, share], [target, ca.MX(self.program.sparsity, soft)])
 
     def _factor(self, entries: ca.DM, firm: float) -> int:
         """Factorise a matrix with its diagonal shifted; the number of its negative pivots less that of rows.
 
         Nor are places that slide counted.  :data:`FAILED` if the factors break down, 0 for unsymmetric matrices.
         """
-        self._target, self._matrix = self._made_firm(entries, firm)
+        self._target, self._matrix = self._made_firm(entries, firm, self.rules.soft)
         if not self._symmetric or not self._total:
             return 0
         try:
             self._solver.nfact(self._matrix)
         except RuntimeError:
             return FAILED
-        return int(self._solver.neig(self._matrix)) - (self._total - self._unknowns) - self._sliding
+        negative = int(self._solver.neig(self._matrix)) - (self._total - self._unknowns) - self._sliding
+        if self.pivoted:
+            _, self._matrix = self._made_firm(entries, firm, self.rules.hard)
+        return negative
 
     def _backward(self, b: Array) -> Array:
         if not self._total:
             return b
-        if not self._symmetric:
+        if self.pivoted:
             return _flat(self.program.linear(self._matrix.nz[:], b))
         return _flat(self._solver.solve(self._matrix, b))
 

@@ -119,6 +119,10 @@ static int sf_factor(sf_run *run, const double *entries, double firm) {
     if (m->pivots[i] == 0.0) return SF_FAILED;
     negative += m->pivots[i] < 0.0;
   }
+#if SF_PIVOTED
+  sf_copy(m->matrix, m->target, SF_ENTRIES);
+  for (i = 0; i < SF_TOTAL; ++i) m->matrix[sf_diagonal[i]] += SF_HARD * sf_soft[i];
+#endif
   /* Nor are places that slide along what they touch, in which nothing is least, counted. */
   return negative - (SF_TOTAL - SF_UNKNOWNS) - SF_SLIDING;
 #else
@@ -128,7 +132,7 @@ static int sf_factor(sf_run *run, const double *entries, double firm) {
 
 static void sf_backward(sf_run *run, const double *b, double *x) {
   @name@_memory *m = run->m;
-#if SF_SYMMETRIC
+#if !SF_PIVOTED
   sf_copy(x, b, SF_TOTAL);
   casadi_ldl_solve(x, 1, sf_lower, m->lower, m->pivots, sf_order, m->w);
 #else
