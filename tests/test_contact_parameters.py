@@ -124,16 +124,25 @@ TELLS = ["nodes.B.position", "contacts.c.force", "reactions.A.moment"]
 )
 def test_derivatives_along_lines_are_those_of_statics(parts, ways):
     scene, names, step = Scene.from_dict(parts), list(ways), 1e-3
-    answer = parametric(scene, names, TELLS).solve()
+    function = parametric(scene, names, TELLS)
+    answer, way = function.solve(), np.array(list(ways.values()))
     assert answer.stable is True
     assert answer.of.solver.model.mesh.lies
-    slope = answer.flat_jacobian @ list(ways.values())
-    base = answer.values
-    ends = ({name: base[name] + sign * step * way for name, way in ways.items()} for sign in (1.0, -1.0))
+    slope = answer.flat_jacobian @ way
+    ends = [function.by_parameter(answer.numbers + sign * step * way) for sign in (1.0, -1.0)]
     up, down = (told(with_values(scene, each), TELLS) for each in ends)
     wanted = (up - down) / (2.0 * step)
     # Positions are a thousand times as accurate as was asked for, forces a hundred times; third derivatives leave 1e-6.
     assert slope == pytest.approx(wanted, rel=1e-5, abs=1e-5 * np.abs(wanted).max())
+    # Elements follow the ends of the line.
+    near = [function.solve(each, answer) for each in ends]
+    assert all(one.of is function for one in near)
+    assert np.concatenate([near[0][name] for name in TELLS]) == pytest.approx(up, abs=1e-6 * np.abs(up).max())
+    curved = (near[0].flat_jacobian - near[1].flat_jacobian) @ way / (2.0 * step)
+    for i in np.flatnonzero(np.abs(curved) > 1e-2 * np.abs(curved).max()):
+        found = way @ answer.flat_hessian(np.eye(len(curved))[i]) @ way
+        # Fourth derivatives leave 1e-5.
+        assert found == pytest.approx(curved[i], rel=1e-4)
 
 
 def test_section_forces_and_errors_along_a_line():
@@ -148,18 +157,25 @@ def test_section_forces_and_errors_along_a_line():
         assert answer[name] == pytest.approx(fine[name.rpartition(".")[2]], abs=1e-8 * np.abs(answer[name]).max())
         # The accuracy that was asked for, of forces that are tens.
         assert errors[name] < 1e-5
+    with pytest.raises(SolveError, match="second derivatives are not known beside answers along a member that lies"):
+        answer.hessian(names[0])
+    # Elements stay, so that lines that end elsewhere are found anew.
+    other = answer.of.solve({"loads.F.value": [0, -31]}, answer)
+    assert other.of is not answer.of
+    fine = other.certified().along("beam", np.array(at))
+    assert other[names[2]] == pytest.approx(fine["moment"], abs=1e-7)
 
 
 def test_lines_for_other_numbers_are_found_anew():
     function = parametric(Scene.from_dict({**ON_FLOOR, "loads": weight(-3)}), ["loads.W.value"], TELLS)
     last = function.solve()
-    for value in (-4.0, -60.0, -58.0):
+    for value in (-4.0, -60.0, -50.0):
         last = function.solve({"loads.W.value": [0, value]}, last)
         wanted = told(function.scene_at(last.values), TELLS)
         assert np.concatenate([last[name] for name in TELLS]) == pytest.approx(wanted, abs=1e-5 * np.abs(wanted).max())
         assert last.of.solver.model.mesh.lies == (value < -5.0)
-    with pytest.raises(SolveError, match="second derivatives are not known where a member lies along an obstacle"):
-        last.hessian("nodes.B.position")
+    # Without line, and with two ways of lying.
+    assert len(function.touching.equilibria) == 1
 
 
 # -- what else touches -------------------------------------------------------------------------------------------

@@ -198,7 +198,7 @@ def test_known_derivatives_tell_where_to_begin():
     # Both to rounding.
     assert flat(after) == pytest.approx(flat(before), abs=1e-11)
     # Far away first derivatives lead nowhere.
-    far = answer.near(answer.numbers + 100.0)
+    far, _ = answer.near(answer.numbers + 100.0)
     assert far is answer.outcome.state
 
 

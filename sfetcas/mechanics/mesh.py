@@ -356,6 +356,12 @@ class Mesh:
         return any(point.line for point in self.points)
 
     @property
+    def line_ends(self) -> tuple[ContactPoint, ...]:
+        """The points at which lines on obstacles end that slide."""
+        on_lines = {point.pair for point in self.points if point.line}
+        return tuple(point for point in self.points if point.pair in on_lines and point.slides == (True,))
+
+    @property
     def elements(self) -> int:
         """Number of elements of all members."""
         return sum(len(cuts) - 1 for cuts in self.cuts.values())

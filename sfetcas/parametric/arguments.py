@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from itertools import pairwise, zip_longest
 from typing import Any
@@ -27,7 +27,7 @@ from ..mechanics.beams import ELEMENT_DATA
 from ..mechanics.equations import Equations
 from ..mechanics.expressions import LOADS, Expressions
 from ..mechanics.loading import Loading
-from ..mechanics.mesh import Mesh, breaks_of
+from ..mechanics.mesh import ContactPoint, Mesh, breaks_of
 from ..mechanics.model import Model, assemble
 from ..mechanics.terms import ALWAYS
 from ..solvers.program import Program, data_of, is_data
@@ -502,7 +502,9 @@ class Arguments:
     """The data and loads of the equations as functions of the arguments.
 
     The numbers of the scene are symbols in the data of its model, which is assembled once: at values near those of the
-    scene at which no entry vanishes by chance, so that its sparsity is that for all values.
+    scene at which no entry vanishes by chance, so that its sparsity is that for all values.  Where members lie along
+    obstacles so are the places at which elements end where lines do: these come after the numbers.  They stay where
+    there are results along the member.
 
     With ``needed`` numbers on which nothing depends are refused.
 
@@ -514,6 +516,10 @@ class Arguments:
     program : Program
     defaults : ndarray (numbers,)
         Values of the scene, in its units.
+    ends : tuple of ContactPoint
+        The points where lines end.
+    places : ndarray (ends,)
+        Fractions of the lengths of their members at which elements end beside them.
     idle : tuple of str
         Numbers on which nothing depends.
     """
@@ -537,8 +543,12 @@ class Arguments:
         _check_apart(scene, self.arguments)
         # Factors multiply what the other numbers say.
         self._own = [i for i, name in enumerate(self._names) if not _is_factor(name)]
-        self._symbols = ca.SX.sym("numbers", len(self._own))
-        symbolic = self._assembled(base) if self._own else base
+        told = results.along
+        self.ends = tuple(point for point in base.mesh.line_ends if point.members[0] not in told)
+        self.places = np.array([_beside_end(base.mesh, point) for point in self.ends])
+        self._used = np.array([*self._own, *range(len(self.defaults), self.size)], dtype=np.intp)
+        self._symbols = ca.SX.sym("numbers", len(self._used))
+        symbolic = self._assembled(base) if len(self._used) else base
         results.refuse_along(name for name, cuts in symbolic.mesh.cuts.items() if isinstance(cuts, Active))
         self.model = _at_values(symbolic)
         self.expressions = Expressions(Equations(self.model, kernels="interpreted"), "interpreted")
@@ -557,6 +567,26 @@ class Arguments:
             refuse_idle(self.idle)
         self.program = Program(self.expressions, self._varying(), prefix=prefix)
 
+    @property
+    def size(self) -> int:
+        """Length of vectors of all numbers: those of the arguments, then the places where lines end."""
+        return len(self.defaults) + len(self.ends)
+
+    def within(self, places: Array) -> bool:
+        """Whether elements can end at places (ends,) in the order in which they do, none far shorter than before."""
+        for name, ends in self._moved_ends(places.tolist()).items():
+            before, there = _knots(self._scene, name, ends), _knots(self._scene, name, ends, ends.values())
+            if not (np.diff(there) > LEFT * np.diff(before)).all():
+                return False
+        return True
+
+    def _moved_ends(self, places: Sequence[Any]) -> dict[str, dict[float, Any]]:
+        """For each member with lines where elements that end at fractions of its length are to end."""
+        found: dict[str, dict[float, Any]] = {}
+        for point, before, there in zip(self.ends, self.places.tolist(), places, strict=True):
+            found.setdefault(point.members[0], {})[before] = there
+        return found
+
     def accepted(self, values: Array) -> bool:
         """Whether values (numbers,), in the units of the scene, are finite and within their limits."""
         limits = [one.limits for one in self.arguments for _ in one.default]
@@ -566,11 +596,14 @@ class Arguments:
 
     def _assembled(self, base: Model) -> Model:
         """The model with symbols in the place of numbers."""
-        values, assembly = self._generic(), base.assembly
-        plain, symbolic = (self._followed(each.tolist()) for each in (values, Active(values, self._symbols)))
+        count, assembly = len(self._own), base.assembly
+        values = np.concatenate([self._generic(), self.places])
+        numbers_there = values.tolist(), Active(values, self._symbols).tolist()
+        plain, symbolic = (self._followed(each[:count]) for each in numbers_there)
         try:
-            known = depending(with_numbers(self._scene, plain), symbolic)
-            return assemble(known, with_cuts(self._scene, base.mesh, symbolic), assembly=assembly, scales=base.scales)  # type: ignore[arg-type]
+            known = depending(with_numbers(self._scene, plain), symbolic) if count else self._scene
+            mesh = with_cuts(self._scene, base.mesh, symbolic, self._moved_ends(numbers_there[1][count:]))
+            return assemble(known, mesh, assembly=assembly, scales=base.scales)  # type: ignore[arg-type]
         except SceneError as error:
             raise SceneError(f"{error} (asked for by the arguments)") from None
 
@@ -605,7 +638,7 @@ class Arguments:
         """Refuse numbers that the unknowns themselves depend on; those on which nothing depends."""
         parts = [symbolic.rotations.axis, symbolic.unwrapping.axis, symbolic.unwrapping.across]
         axes = _Part(gathered(parts), self._symbols, "axes")
-        for i, turns in zip(self._own, axes.numbers, strict=True):
+        for i, turns in zip(self._own, axes.numbers, strict=False):
             if turns:
                 message = "found a number that turns an axis about which angles are unknowns or counted"
                 raise SceneError(f"{message}, accepted: one that leaves it as it is", ("arguments", self._names[i]))
@@ -613,7 +646,7 @@ class Arguments:
         for name, course in self._courses.items():
             if f"histories.{name}" not in self._names:
                 known = known | course.numbers
-        return tuple(self._names[i] for i, used in zip(self._own, known, strict=True) if not used)
+        return tuple(self._names[i] for i, used in zip(self._own, known, strict=False) if not used)
 
     def scene_at(self, values: Array) -> Scene:
         """The scene with values (numbers,) of its numbers, in its units; a load factor replaces all ``steps``."""
@@ -627,11 +660,21 @@ class Arguments:
         analysis = scene.analysis.model_copy(update={"steps": steps})
         return scene.model_copy(update={"analysis": analysis, "histories": histories})
 
-    def mesh_at(self, scene: Scene, mesh: Mesh) -> Mesh:
-        """A mesh of the scene as given, with ends of elements where they are with other values of its numbers."""
+    def mesh_at(self, scene: Scene, mesh: Mesh, places: Array | None = None) -> Mesh:
+        """A mesh of the scene as given, with ends of elements where they are with other values of its numbers.
+
+        ``places`` (ends,) are those where lines end, by default those of the scene.
+        """
         moving = [one.name for one in self.arguments if MOVING.fullmatch(one.name) or SLIDING.fullmatch(one.name)]
         there = {name: float(_value(scene, name.split("."), name)) for name in moving}
-        return with_cuts(self._scene, mesh, there) if there else mesh
+        ends = self._moved_ends((self.places if places is None else places).tolist())
+        moved, points = with_cuts(self._scene, mesh, there, ends), list[ContactPoint]()
+        for point in mesh.points:
+            (first, *_), (at, *_) = point.members, point.at
+            points.append(
+                replace(point, at=(float(moved.cuts[first][mesh.cut_at(first, at)]),)) if point.line else point
+            )
+        return replace(moved, points=tuple(points))
 
     # -- what is given --------------------------------------------------------------------------------
 
@@ -671,12 +714,12 @@ class Arguments:
         return flags
 
     def undeformed(self, p: ca.MX) -> ca.MX:
-        """Undeformed positions as :meth:`.Results.rest` gives them, for numbers (numbers,)."""
-        return self._undeformed.at(picked(p, np.array(self._own, dtype=np.intp)))
+        """Undeformed positions as :meth:`.Results.rest` gives them, for all numbers (size,)."""
+        return self._undeformed.at(picked(p, self._used))
 
     def given(self, p: ca.MX) -> ca.MX:
-        """Data and loads as :class:`~sfetcas.solvers.program.Program` takes them, for numbers (numbers,)."""
-        own = picked(p, np.array(self._own, dtype=np.intp))
+        """Data and loads as :class:`~sfetcas.solvers.program.Program` takes them, for all numbers (size,)."""
+        own = picked(p, self._used)
         data, loads = self._split(self._given.at(own), ca.vertsplit)
         names = list(self._layout)
         found: dict[str, ca.MX] = dict(zip(names, data, strict=False))
@@ -699,7 +742,7 @@ class Arguments:
             at = ca.MX(0.0 if moving else argument(self._scene, FACTOR).default[0])
             at = p[self._names.index(FACTOR)] if follows else at
             knots = self._scene.histories[str(group)].t
-            flat = course.at(picked(p, np.array(self._own, dtype=np.intp)))
+            flat = course.at(picked(p, self._used))
             terms, ends = ca.vertsplit(flat, [0, flat.numel() - 2, flat.numel()])
             return piecewise(at, knots, ca.reshape(terms, max(len(knots) - 1, 1), -1), ends)
         # What is no argument stands as it would by default.
@@ -707,7 +750,7 @@ class Arguments:
 
     def prepare(self, name: str) -> ca.Function:
         """A function (arguments) -> given, with a name."""
-        p = ca.MX.sym("arguments", len(self.defaults))
+        p = ca.MX.sym("arguments", self.size)
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
 
 
@@ -743,9 +786,14 @@ def in_words(arguments: Arguments, results: Results) -> list[str]:
     return [named(parameters, "parameter"), named(answers, "answer")]
 
 
-def with_cuts(scene: Scene, mesh: Mesh, symbolic: Mapping[str, Any]) -> Mesh:
-    """The mesh with symbolic ends of elements that move with the places of loads and tubes along their members."""
-    moving: dict[str, dict[float, Any]] = {}
+def with_cuts(
+    scene: Scene, mesh: Mesh, symbolic: Mapping[str, Any], ends: Mapping[str, Mapping[float, Any]] | None = None
+) -> Mesh:
+    """The mesh with symbolic ends of elements that move with the places of loads and tubes along their members.
+
+    With them go others: ``ends`` says for each member where elements that end at fractions of its length are to end.
+    """
+    moving = {name: dict(places) for name, places in (ends or {}).items()}
     for name, place in symbolic.items():
         found = MOVING.fullmatch(name)
         member = str(scene.loads[found[1]].member) if found else ""
@@ -755,7 +803,7 @@ def with_cuts(scene: Scene, mesh: Mesh, symbolic: Mapping[str, Any]) -> Mesh:
             moving.setdefault(member, {})[at] = there
     cuts = dict(mesh.cuts)
     for member, places in moving.items():
-        breaks = breaks_of(scene, member)
+        breaks = _knots(scene, member, (ends or {}).get(member, ()))
         there, moved = list(breaks), np.zeros(len(cuts[member]), bool)
         for at, place in places.items():
             number = int(np.argmin(np.abs(breaks - at)))
@@ -763,6 +811,26 @@ def with_cuts(scene: Scene, mesh: Mesh, symbolic: Mapping[str, Any]) -> Mesh:
             moved |= (cuts[member] > breaks[number - 1]) & (cuts[member] < breaks[number + 1])
         cuts[member] = np.where(moved, np.interp(cuts[member], breaks, numbers(there)), cuts[member])
     return replace(mesh, cuts=cuts)
+
+
+def _knots(scene: Scene, member: str, ends: Iterable[float], there: Iterable[float] | None = None) -> Array:
+    """Fractions (n,) of the length of a member between which its elements keep their shares: kinks, and ends of lines;
+    with ``there`` when these have moved there.
+    """
+    breaks, ends = breaks_of(scene, member), list(ends)
+    knots = np.concatenate([breaks, ends])
+    order = np.argsort(knots)
+    return (knots if there is None else np.concatenate([breaks, list(there)]))[order]
+
+
+LEFT = 0.05
+"""Share of what is between kinks and ends of lines below which elements there are too short."""
+
+
+def _beside_end(mesh: Mesh, point: ContactPoint) -> float:
+    """Where elements end beside the end of a line."""
+    member = point.members[0]
+    return float(mesh.cuts[member][mesh.cut_at(member, point.at[0])])
 
 
 def _check_apart(scene: Scene, arguments: Sequence[Argument]) -> None:

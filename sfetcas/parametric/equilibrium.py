@@ -33,6 +33,7 @@ from .results import Results, default_results
 from .watching import LEAST, margins_of
 
 __all__ = [
+    "SOLVED",
     "EquilibriumSolver",
     "Place",
     "asked_mesh",
@@ -106,22 +107,33 @@ class EquilibriumSolver:
         """What is given at the start, and its state, where equilibria are not followed from zero."""
         if self.begun is None or self.start is None:
             return None
-        return np.array(self.prepare(self.begun)).ravel(), self.start
+        return np.array(self.prepare(np.append(self.begun, self.arguments.places))).ravel(), self.start
 
     @functools.cached_property
     def prepare(self) -> ca.Function:
-        """``(arguments) -> given``: data and loads of the equations."""
+        """``(arguments) -> given``: data and loads of the equations.
+
+        Arguments are here and in other functions followed by the places where lines end.
+        """
         return self.arguments.prepare(f"{self.name}_prepare")
 
     @functools.cached_property
     def output(self) -> ca.Function:
         """``(arguments, state, given) -> results``."""
         program = self.arguments.program
-        p = ca.MX.sym("arguments", len(self.arguments.defaults))
+        p = ca.MX.sym("arguments", self.arguments.size)
         outputs = self.results.expression(program, self.arguments.undeformed(p))
         names = ["arguments", "state", "given"]
         symbols = [p, program.state_symbol, program.symbol]
         return ca.Function(f"{self.name}_results", symbols, [ca.densify(outputs)], names, ["results"])
+
+    @functools.cached_property
+    def places(self) -> ca.Function:
+        """``(arguments, state, given) ->`` where lines end (ends,), fractions of the lengths of their members."""
+        program, p = self.arguments.program, ca.MX.sym("arguments", self.arguments.size)
+        found = self.results.touches(program, self.arguments.undeformed(p), self.arguments.ends)
+        symbols = [p, program.state_symbol, program.symbol]
+        return ca.Function(f"{self.name}_places", symbols, [found], ["arguments", "state", "given"], ["places"])
 
     @functools.cached_property
     def sensitivities(self) -> ca.Function:
@@ -129,9 +141,12 @@ class EquilibriumSolver:
 
         By the implicit function theorem, with the solution of one linear system for each argument.
         """
-        program = self.arguments.program
-        p, state, given = ca.MX.sym("arguments", len(self.arguments.defaults)), program.state_symbol, program.symbol
-        outputs = self.results.expression(program, self.arguments.undeformed(p))
+        program, ends = self.arguments.program, self.arguments.ends
+        p, state, given = ca.MX.sym("arguments", self.arguments.size), program.state_symbol, program.symbol
+        undeformed = self.arguments.undeformed(p)
+        outputs = ca.vertcat(
+            self.results.expression(program, undeformed), self.results.touches(program, undeformed, ends)
+        )
         # Along the arguments only: whole derivatives by states would be a hundred times the code.
         given_by_p = ca.densify(ca.jacobian(self.arguments.given(p), p))
         residual = program.stationarity.residual
@@ -141,6 +156,11 @@ class EquilibriumSolver:
         step = -ca.solve(program.matrix, ca.densify(out), "qr", {"eps": 1e-300})
         changed = ca.densify(held_by_p + ca.mtimes(program.moving, step))
         found = ca.jacobian(outputs, p) + ca.jtimes(outputs, given, given_by_p) + ca.jtimes(outputs, state, changed)
+        if ends:
+            # Lines end where elements do: c = s(p, c).
+            n, count = self.results.size, len(self.arguments.defaults)
+            of_ends = ca.solve(ca.DM.eye(len(ends)) - found[n:, count:], found[n:, :count], "qr", {"eps": 1e-300})
+            found = found[:n, :count] + ca.mtimes(found[:n, count:], of_ends)
         names = ["arguments", "state", "given"]
         flat = ca.vec(ca.densify(found).T)
         return ca.Function(f"{self.name}_sensitivity", [p, state, given], [flat], names, ["sensitivities"])
@@ -154,13 +174,12 @@ class EquilibriumSolver:
         start : (states,), state to begin with, for a warm start
         """
         p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
-        given = np.array(self.prepare(p)).ravel()
-        good = self.arguments.accepted(p)
-        begin = self.start if start is None else start
-        outcome = self.method(given if good else given * np.nan, begin, warm=start is not None)
+        outcome = self.found(p, start)
         nothing = np.full(self.results.size, np.nan)
-        if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
+        if outcome.code not in SOLVED:
             return outcome, nothing
+        p = np.append(p, outcome.places)
+        given = np.array(self.prepare(p)).ravel()
         try:
             outputs = np.array(self.output(p, outcome.state, given)).ravel()
         except RuntimeError:
@@ -171,6 +190,33 @@ class EquilibriumSolver:
         if self.margins is not None and not np.array(self.margins(p, outcome.state, given)).min(initial=0.0) >= LEAST:
             return replace(outcome, code=Code.TOUCHES), nothing
         return outcome, outputs
+
+    def found(self, arguments: Array, start: Array | None = None, places: Array | None = None) -> Outcome:
+        """The equilibrium for arguments (numbers,), on elements that end where lines do.
+
+        Parameters
+        ----------
+        start : (states,), state to begin with, for a warm start
+        places : (ends,), where elements end then
+        """
+        known, iterations = self.arguments, 0
+        state, ends = self.start if start is None else start, known.places if places is None else places
+        warm, good = start is not None, known.accepted(arguments)
+        for _ in range(FITS):
+            p = np.append(arguments, ends)
+            given = np.array(self.prepare(p)).ravel()
+            outcome = self.method(given if good else given * np.nan, state, warm=warm)
+            iterations += outcome.iterations
+            outcome = replace(outcome, iterations=iterations, places=ends)
+            if outcome.code not in SOLVED or not len(ends):
+                return outcome
+            there = np.array(self.places(p, outcome.state, given)).ravel()
+            if np.abs(there - ends).max() <= FITTED:
+                return outcome
+            if not known.within(there):
+                return replace(outcome, code=Code.TOUCHES)
+            ends, state, warm = there, outcome.state, True
+        return replace(outcome, code=Code.STALLED)
 
     @property
     def unique(self) -> bool:
@@ -187,6 +233,16 @@ class EquilibriumSolver:
         bounds = np.cumsum([0, *(result.size for result in self.results.results)]).tolist()
         parts = zip(self.results.results, bounds, bounds[1:], strict=False)
         return {one.name: results[a:b].reshape(one.shape) for one, a, b in parts}
+
+
+SOLVED = (Code.SOLVED, Code.UNSTABLE)
+"""Outcomes with an equilibrium."""
+
+FITS, FITTED = 12, 1e-9
+"""Meshes at most, of which the last ends elements where lines end; how far these may be apart, fractions of a length.
+
+What presses between is one force: it is off by the square of that.
+"""
 
 
 def equilibrium_solver(
@@ -232,6 +288,9 @@ def equilibrium_solver(
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
     unique = not any(note.startswith(NOT_UNIQUE) for note in answer.notes)
     names = results or default_results(base, unique=unique)
+    if not results and mesh.lies:
+        # Elements move with the ends of lines.
+        names = [name for name in names if not name.startswith("members.")]
     outputs = Results(base, names, chosen_places(members, places or {}), unique=unique)
     outputs.refuse_places()
     known = Arguments(scene, base, asked_for(scene, arguments), outputs, f"{name}_", needed=not stopped)
@@ -257,7 +316,7 @@ def _answered(solver: EquilibriumSolver) -> Array:
 def _same(solver: EquilibriumSolver) -> bool:
     """Whether a cold solve of the defaults leads to the answer of statics, on another mesh or not."""
     outcome, _ = solver.solve()
-    if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
+    if outcome.code not in SOLVED:
         return False
     found, wanted = (solver.arguments.program.state(flat) for flat in (outcome.state, _answered(solver)))
     return Prepared(solver.model).distance(found, wanted) < ELSEWHERE
@@ -383,10 +442,14 @@ def in_contact(kept: Kept, model: Model) -> State:
 
 
 def what_touches(mesh: Mesh) -> list[tuple[Any, ...]]:
-    """What touches on a mesh, and whether it slides there; where that is it finds itself."""
+    """What touches on a mesh, and whether it slides there; where that is it finds itself.
+
+    Of lines it is that they end, not what stands for what presses between.
+    """
     return [
         (p.contact, p.members, p.slides, p.edge, [x for x, free in zip(p.at, p.slides, strict=True) if not free])
         for p in mesh.points
+        if not p.line
     ]
 
 

@@ -9,6 +9,12 @@ both functions of this step, ``K = dF/dstep`` and ``S = dstep/dp = -K^-1 dF/dp``
 exact however the step is defined, as long as it is the same in both.  Equations and answers depend on the parameters
 through the *data* only, with the chain rule ``d/dp = d/ddata ddata/dp``.
 
+Where lines end elements do: the places ``c`` of these are further numbers, and answers ``s`` besides, with ``c = s``,
+
+    dc/dp = (I - s_c)^-1 s_p,      da/dp = a_p + a_c dc/dp,
+
+and second derivatives are those of ``a + a_c (I - s_c)^-1 s`` in the directions ``[I; dc/dp]``.
+
 Source: Hinze, Pinnau, Ulbrich and Ulbrich 2009, section 1.6 (sensitivities and adjoints; the second derivatives).
 """
 
@@ -62,12 +68,21 @@ class Slopes:
     jacobian : ndarray (answers, numbers)
     entries : ndarray
         Entries of the Newton matrix.
+    places : ndarray (ends, numbers)
+        Derivatives of the places where lines end.
+    whole : ndarray (total, numbers + ends)
+        Derivatives of the step by the numbers and these places.
+    weights : ndarray (answers, ends)
+        Weights of the places as answers beside each answer.
     """
 
     steps: Array
     answers: Array
     jacobian: Array
     entries: Array
+    places: Array
+    whole: Array
+    weights: Array
 
 
 class Implicit:
@@ -92,7 +107,7 @@ class Implicit:
     def __init__(self, arguments: Arguments, results: Results, weight: Array, *, unique: bool = True) -> None:
         self._arguments, self._results, self._program = arguments, results, arguments.program
         self._weight, self._unique = weight, unique
-        self.total, self._count = arguments.expressions.total, len(arguments.defaults)
+        self.total, self._count = arguments.expressions.total, arguments.size
         self.rotation_unknowns = self._program.equations.rotation_unknowns
         self._symmetric = self._program.model.has_potential
         self._batches: dict[str, Batch] = {}
@@ -126,8 +141,10 @@ class Implicit:
 
     @functools.cached_property
     def _outputs(self) -> ca.MX:
-        """The answers after a step."""
-        return self._at(self._results.expression(self._program, self._rest, short=True))
+        """The answers after a step, then the places where lines end."""
+        found = self._results.expression(self._program, self._rest, short=True)
+        places = self._results.touches(self._program, self._rest, self._arguments.ends)
+        return self._at(ca.vertcat(found, places))
 
     @functools.cached_property
     def _seeds(self) -> ca.MX:
@@ -189,7 +206,7 @@ class Implicit:
     def _by_step(self) -> ca.Function:
         """(x, state, weights) -> derivative of weighted answers by the step."""
         x, state = self._symbols
-        weights = ca.MX.sym("weights", self._results.size)
+        weights = ca.MX.sym("weights", self._outputs.numel())
         found = ca.jtimes(self._outputs, x, weights, True)[: self.total]
         return ca.Function("by_step", [x, state, weights], [ca.densify(found)])
 
@@ -200,7 +217,7 @@ class Implicit:
         But for what the data add that are curved themselves: by the second result, their gradient, which is returned.
         """
         x, state = self._symbols
-        weights, m = ca.MX.sym("weights", self._results.size), ca.MX.sym("multipliers", self.total)
+        weights, m = ca.MX.sym("weights", self._outputs.numel()), ca.MX.sym("multipliers", self.total)
         steps = ca.MX.sym("steps", self.total, self._count)
         lagrangian = ca.dot(weights, self._outputs) + ca.dot(m, self._at(self._program.forces.residual))
         along, gradient = self._directions(steps), ca.gradient(lagrangian, x)
@@ -236,11 +253,21 @@ class Implicit:
         x, seeds = at
         if self._by_all is None:
             answers, jacobian = self._called("_along", x, state, seeds, steps.T)
-            return Slopes(steps, answers, jacobian.reshape(self._count, -1).T.copy(), entries)
+            return self._with_ends(steps, answers, jacobian.reshape(self._count, -1).T.copy(), entries)
         answers, values, by_data = self._called("_by_all", x, state, seeds)
         by_step = np.zeros((len(answers), self.total))
         by_step[self._filled] = values
-        return Slopes(steps, answers, by_step @ steps + by_data.reshape(self._count, -1).T, entries)
+        return self._with_ends(steps, answers, by_step @ steps + by_data.reshape(self._count, -1).T, entries)
+
+    def _with_ends(self, steps: Array, answers: Array, jacobian: Array, entries: Array) -> Slopes:
+        """Derivatives by the numbers from those of all answers by all numbers, with places where lines end."""
+        n, count = self._results.size, len(self._arguments.defaults)
+        left = np.eye(len(self._arguments.ends)) - jacobian[n:, count:]
+        places, weights = np.linalg.solve(left, jacobian[n:, :count]), np.linalg.solve(left.T, jacobian[:n, count:].T).T
+        by_numbers = jacobian[:n, :count] + jacobian[:n, count:] @ places
+        return Slopes(
+            steps[:, :count] + steps[:, count:] @ places, answers[:n], by_numbers, entries, places, steps, weights
+        )
 
     @functools.cached_property
     def _filled(self) -> tuple[Array, Array]:
@@ -252,10 +279,13 @@ class Implicit:
     def second(self, p: Array, state: Array, slopes: Slopes, weights: Array) -> Array:
         """Hessian (numbers, numbers) of the sum of all answers times their ``weights`` (answers,)."""
         x, seeds = self._x(p)
+        weights = np.append(weights, weights @ slopes.weights)
         (right,) = self._called("_by_step", x, state, weights)
         multipliers = self._transposed(slopes.entries, -right)
-        found, gradient = self._called("_curved", x, state, seeds, weights, multipliers, slopes.steps.T)
+        found, gradient = self._called("_curved", x, state, seeds, weights, multipliers, slopes.whole.T)
         found = found.reshape(self._count, self._count) + self._data.curved(p, gradient)
+        along = np.vstack([np.eye(slopes.places.shape[1]), slopes.places])
+        found = along.T @ found @ along
         return 0.5 * (found + found.T)
 
     def _called(self, name: str, *given: Array) -> list[Array]:
@@ -350,13 +380,13 @@ class _Data:
     """
 
     def __init__(self, arguments: Arguments) -> None:
-        p = ca.MX.sym("p", len(arguments.defaults))
+        p = ca.MX.sym("p", arguments.size)
         given, rest = ca.densify(arguments.given(p)), ca.densify(arguments.undeformed(p))
         flat, self.undeformed_size = ca.vertcat(given, rest), rest.numel()
         rows = sorted(set(ca.jacobian_sparsity(flat, p).row()))
         data = flat[rows]
         self._rows, self.size, self._given = rows, len(rows), given.numel()
-        self._constant = ca.Function("constant", [p], [flat])(arguments.defaults)
+        self._constant = ca.Function("constant", [p], [flat])(np.append(arguments.defaults, arguments.places))
         derivative = ca.jacobian(data, p)
         self.pattern = derivative.sparsity()
         self._first = ca.Function("data", [p], [data, derivative])

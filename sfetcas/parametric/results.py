@@ -276,6 +276,11 @@ class Results:
                 )
                 raise SceneError(f"{message} touches at one, or contacts.{asked.record}.force", ("results",))
 
+    @property
+    def along(self) -> set[str]:
+        """Members along which there are results."""
+        return {result.asked.record for result in self.results if result.asked.kind.along}
+
     def refuse_along(self, members: Iterable[str]) -> None:
         """Refuse results along members whose elements move with a parameter, and with them the places within elements.
 
@@ -369,6 +374,11 @@ class Results:
         return ca.vertcat(
             *(sum((sections[3 * k + j, :] * about[j, :] for j in range(3)), ca.MX(0)) * inverse for k in range(3))
         )
+
+    def touches(self, program: Program, rest: ca.MX, points: Sequence[ContactPoint]) -> ca.MX:
+        """Where points on obstacles are, fractions (points,) of the lengths of their members."""
+        outputs = Outputs(self, program, rest, None, program.stationarity)
+        return ca.densify(ca.vertcat(ca.MX(0, 1), *(outputs.place(point, 0) for point in points)))
 
     def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None, *, short: bool = False) -> ca.MX:
         """All results (size,), one after the other, each row by row, in SI units.

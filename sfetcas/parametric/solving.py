@@ -30,7 +30,7 @@ from ..solvers.prepared import Prepared
 from ..solvers.program import Program
 from .arguments import Argument, Asked, in_words
 from .choosing import Choosing
-from .equilibrium import EquilibriumSolver, Place, equilibrium_solver, refuse_search
+from .equilibrium import SOLVED, EquilibriumSolver, Place, equilibrium_solver, refuse_search
 from .implicit import Implicit, Slopes
 from .results import Result, Results
 from .touching import Touching
@@ -42,9 +42,6 @@ Values = Mapping[str, ArrayLike]
 
 FAR = 0.3
 """Largest rotation, rad, for which the start of a solve is extrapolated by first derivatives."""
-
-SOLVED = (Code.SOLVED, Code.UNSTABLE)
-"""Outcomes with an equilibrium."""
 
 
 def parametric(
@@ -225,7 +222,7 @@ class ParametricEquilibrium:
             nonlocal last
             of = self._in(choosing, stops)
             if last is not None and last.of.solver is not of.solver:
-                state = choosing.moved(last.of.solver, last.near(numbers), of.solver)
+                state = choosing.moved(last.of.solver, last.near(numbers)[0], of.solver)
                 last = ParametricAnswer(of, numbers, replace(last.outcome, state=state))
             last = known[stops] = of._solved(numbers, last)
             return choosing.margins(of.solver, numbers, last.outcome.state)
@@ -241,7 +238,7 @@ class ParametricEquilibrium:
         except SolveError:
             pass
         else:
-            if not any(touching.kept(first.solver, numbers, answer.outcome.state).changed()):
+            if not any(touching.kept(first.solver, numbers, answer.outcome).changed()):
                 return answer
         solver, state = touching.anew(numbers)
         if solver not in touching.equilibria:
@@ -249,9 +246,9 @@ class ParametricEquilibrium:
             own = self if solver is self.solver else replace(self, solver=replace(solver, start=state, begun=numbers))
             touching.equilibria[solver] = own
         of = touching.equilibria[solver]
-        near = ParametricAnswer(of, numbers, Outcome(Code.SOLVED, state, 0.0, 0, 0))
+        near = ParametricAnswer(of, numbers, Outcome(Code.SOLVED, state, 0.0, 0, 0, solver.arguments.places))
         answer = of._solved(numbers, near)
-        for what in touching.kept(solver, numbers, answer.outcome.state).changed():
+        for what in touching.kept(solver, numbers, answer.outcome).changed():
             raise SolveError(Status.FAILED, f"{what}, where nothing else was found to touch", answer.outcome)
         return answer
 
@@ -264,19 +261,15 @@ class ParametricEquilibrium:
 
     def _solved(self, numbers: Array, start: ParametricAnswer | None) -> ParametricAnswer:
         """The equilibrium for numbers, in the choice of the solver."""
-        outcome = self._outcome(numbers, None if start is None else start.near(numbers))
+        near = () if start is None else start.near(numbers)
+        outcome = self.solver.found(numbers, *near)
         if outcome.code not in SOLVED and start is not None:
-            outcome = self._outcome(numbers, None)
+            outcome = self.solver.found(numbers)
         if outcome.code not in SOLVED:
             status = Status.ITERATIONS if outcome.code is Code.ITERATIONS else Status.FAILED
             said = ", ".join(f"{name} = {x:.6g}" for name, x in zip(self.numbers, numbers, strict=True))
             raise SolveError(status, f"{MEANINGS[outcome.code]}, at {said}", outcome)
         return ParametricAnswer(self, numbers, outcome)
-
-    def _outcome(self, numbers: Array, state: Array | None) -> Outcome:
-        solver = self.solver
-        given = np.array(solver.prepare(numbers)).ravel()
-        return solver.method(given, solver.start if state is None else state, warm=state is not None)
 
     @functools.cached_property
     def implicit(self) -> Implicit:
@@ -357,9 +350,9 @@ class ParametricAnswer:
             A stiffness or compliance that was asked for has no value, as the equilibrium is singular.
         """
         solver = self.of.solver
-        given = np.array(solver.prepare(self.numbers)).ravel()
+        given = np.array(solver.prepare(self._whole)).ravel()
         try:
-            return solver.by_name(np.array(solver.output(self.numbers, self.outcome.state, given)).ravel())
+            return solver.by_name(np.array(solver.output(self._whole, self.outcome.state, given)).ravel())
         except RuntimeError:
             detail = "a stiffness or compliance that was asked for has no value"
             raise SolveError(Status.SINGULAR, detail) from None
@@ -374,20 +367,28 @@ class ParametricAnswer:
             raise SceneError(unknown(name, known, "such answers"), ("answers",))
         return name
 
-    def near(self, numbers: Array) -> Array:
-        """A state (states,) to start from for other ``numbers``.
+    @property
+    def _whole(self) -> Array:
+        """The numbers, and where lines end."""
+        return np.append(self.numbers, self.outcome.places)
+
+    def near(self, numbers: Array) -> tuple[Array, Array]:
+        """A state (states,) to start from for other ``numbers``, and where lines end there (ends,).
 
         It is extrapolated where first derivatives are known already and rotations change little.
         """
         # What has been computed already costs nothing.
         slopes: Slopes | None = self.__dict__.get("_slopes")
+        here = self.outcome.state, self.outcome.places
         if slopes is None:
-            return self.outcome.state
+            return here
         step = slopes.steps @ (numbers - self.numbers)
         rotation_unknowns = self.of.implicit.rotation_unknowns
-        if not np.abs(step[:rotation_unknowns]).max(initial=0.0) <= FAR:
-            return self.outcome.state
-        return np.array(self.of.solver.arguments.program.move(self.outcome.state, step, 1.0)).ravel()
+        places = self.outcome.places + slopes.places @ (numbers - self.numbers)
+        arguments = self.of.solver.arguments
+        if not np.abs(step[:rotation_unknowns]).max(initial=0.0) <= FAR or not arguments.within(places):
+            return here
+        return np.array(arguments.program.move(self.outcome.state, step, 1.0)).ravel(), places
 
     # -- derivatives --------------------------------------------------------------------------------
 
@@ -396,8 +397,8 @@ class ParametricAnswer:
         if self.of.choosing is not None:
             self.of.choosing.refuse_doubt(self.of.solver, self.numbers, self.outcome.state)
         if self.of.touching is not None:
-            self.of.touching.refuse_doubt(self.of.solver, self.numbers, self.outcome.state)
-        return self.of.implicit.slopes(self.numbers, self.outcome.state)
+            self.of.touching.refuse_doubt(self.of.solver, self.numbers, self.outcome)
+        return self.of.implicit.slopes(self._whole, self.outcome.state)
 
     @property
     def flat_jacobian(self) -> Array:
@@ -433,16 +434,17 @@ class ParametricAnswer:
         SceneError
             There are more or fewer weights.
         SolveError
-            The equilibrium is singular, or a member lies along an obstacle.
+            The equilibrium is singular, or there are answers along a member that lies along an obstacle.
         """
-        if self.of.solver.model.mesh.lies:
-            detail = "second derivatives are not known where a member lies along an obstacle"
-            raise SolveError(Status.FAILED, f"{detail}, accepted: differences of first ones", self.outcome)
+        solver = self.of.solver
+        if len(solver.model.mesh.line_ends) > len(solver.arguments.ends):
+            detail = "second derivatives are not known beside answers along a member that lies along an obstacle"
+            raise SolveError(Status.FAILED, f"{detail}, accepted: answers of nodes", self.outcome)
         given = np.asarray(weights, dtype=float).ravel()
         size = self.of.solver.results.size
         if len(given) != size:
             raise SceneError(f"found {len(given)} weights, accepted: {size}, one for each number", ("weights",))
-        return self.of.implicit.second(self.numbers, self.outcome.state, self._slopes, given)
+        return self.of.implicit.second(self._whole, self.outcome.state, self._slopes, given)
 
     def hessian(self, answer: str) -> dict[str, dict[str, Array]]:
         """Second derivatives of one answer, ``hessian(answer)[parameter][parameter]``.
@@ -500,7 +502,7 @@ class ParametricAnswer:
 
     def _halved_touching(self, touching: Touching) -> tuple[Program, Array]:
         """As :meth:`_halved`, where what touches may have to be found anew."""
-        found = touching.kept(self.of.solver, self.numbers, self.outcome.state).halved()
+        found = touching.kept(self.of.solver, self.numbers, self.outcome).halved()
         if found is None:
             raise SolveError(Status.FAILED, "what touches was not found on half the elements", self.outcome)
         program = Program(Expressions(Equations(found.model, kernels="interpreted"), "interpreted"))

@@ -18,6 +18,7 @@ from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
+from ..solvers.globalised import Outcome
 from ..solvers.prepared import Prepared, Solved
 from .arguments import Arguments
 from .equilibrium import EquilibriumSolver, in_contact, kept_of, touching_mesh, what_touches
@@ -43,16 +44,16 @@ class Touching:
     settings: Settings
     equilibria: dict[EquilibriumSolver, Any] = field(default_factory=dict)
 
-    def kept(self, solver: EquilibriumSolver, numbers: Array, flat: Array) -> Kept:
+    def kept(self, solver: EquilibriumSolver, numbers: Array, outcome: Outcome) -> Kept:
         """What touches at an equilibrium for numbers (numbers,)."""
         model, arguments = solver.model, solver.arguments
         scene = arguments.scene_at(numbers)
-        mesh = arguments.mesh_at(scene, model.mesh)
+        mesh = arguments.mesh_at(scene, model.mesh, outcome.places)
         own = Prepared(assemble(scene, mesh, assembly=model.assembly, scales=model.scales))  # type: ignore[arg-type]
-        loading, state = own.model.loading(scene.analysis.steps[-1]), arguments.program.state(flat)
+        loading, state = own.model.loading(scene.analysis.steps[-1]), arguments.program.state(outcome.state)
         return kept_of(scene, self.settings, Solved.taken(own, state, loading))
 
-    def refuse_doubt(self, solver: EquilibriumSolver, numbers: Array, flat: Array) -> None:
+    def refuse_doubt(self, solver: EquilibriumSolver, numbers: Array, outcome: Outcome) -> None:
         """Refuse derivatives where they differ to the sides of a change.
 
         Raises
@@ -60,7 +61,7 @@ class Touching:
         SolveError
             Something touches without a force; names it.
         """
-        for what in self.kept(solver, numbers, flat).undecided():
+        for what in self.kept(solver, numbers, outcome).undecided():
             raise SolveError(Status.KINK, f"{what}, and derivatives differ to either side")
 
     def anew(self, numbers: Array) -> tuple[EquilibriumSolver, Array]:
@@ -91,7 +92,7 @@ class Touching:
     def _solver(self, mesh: Mesh) -> EquilibriumSolver:
         """The solver in which the same touches, on whatever mesh."""
         for solver in (self.first, *self.equilibria):
-            if what_touches(solver.model.mesh) == what_touches(mesh):
+            if not mesh.lies and what_touches(solver.model.mesh) == what_touches(mesh):
                 return solver
         first = self.first
         base = assemble(first.scene, mesh, assembly=first.model.assembly, scales=first.model.scales)  # type: ignore[arg-type]

@@ -69,7 +69,7 @@ def margins_of(name: str, base: Model, arguments: Sequence[Argument]) -> ca.Func
     names += [f"nodes.{node}.position" for node in ends]
     results = Results(base, names, dict.fromkeys(flexible, tuple(x.tolist())))
     known = Arguments(scene, base, arguments, results, needed=False)
-    program, p = known.program, ca.MX.sym("arguments", len(known.defaults))
+    program, p = known.program, ca.MX.sym("arguments", known.size)
     outputs = Outputs(results, program, known.undeformed(p), None, program.stationarity)
     positions = {member: outputs.value(answer_name(f"members.{member}.position")) for member in flexible}
     pushes = [outputs.push(point) / base.scales.force for point in points]

@@ -157,6 +157,8 @@ class Outcome:
     negative : int
         Number of negative eigenvalues of the energy on the closings; -1 where loads have no potential.
     iterations : int
+    places : ndarray (ends,)
+        Where elements end beside the ends of lines that move with the numbers, if there are any.
     """
 
     code: Code
@@ -164,6 +166,7 @@ class Outcome:
     residual: float
     negative: int
     iterations: int
+    places: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
