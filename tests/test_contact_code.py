@@ -6,10 +6,11 @@ import sys
 
 import numpy as np
 import pytest
+from scenes import CARRIED
 from test_codegen import built, needs_compiler, said
 from test_contact_design import DRUM, FLOOR, pressed, two
 
-from sfetcas import SceneError, export, solve
+from sfetcas import Scene, SceneError, export, solve
 from sfetcas.parametric.equilibrium import equilibrium_solver
 from sfetcas.solvers.globalised import Code
 
@@ -50,6 +51,42 @@ def test_place_that_comes_to_the_end_of_its_member_is_another_one():
         assert codes[-1] is (Code.SOLVED if at is not None and at < 1.0 else Code.TOUCHES)
     assert codes[0] is Code.SOLVED
     assert codes[-1] is Code.TOUCHES
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_obstacle_that_a_node_carries_is_looked_at_where_it_is(dimension):
+    """A cantilever lifts a drum to the one above it."""
+    drum = {**CARRIED["contacts"]["c"], "type": "circle" if dimension == "plane" else "cylinder"}
+    section = {"plane": {"EI3": 1.0}, "space": {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8}}[dimension]
+    parts = {**CARRIED, "sections": {"s": section}, "contacts": {"c": drum}, "dimension": dimension}
+    parts["nodes"] = {**CARRIED["nodes"], "C": {"position": [0, -0.4], "support": "clamped"}}
+    parts["loads"] = {"P": {"type": "force", "node": "D", "value": [0, 1]}}
+    scene = Scene.from_dict({**parts, "analysis": {"accuracy": 1e-6}})
+    solver = solver_of(scene, arguments=["loads.P.value.1"])
+    loads = (-1.0, 1.0, 2.0, 2.3, 3.0)
+    found = [solver.solve(np.array([load]))[0].code for load in loads]
+    touches = [solve(scene.replace({"loads.P.value.1": load})).last.contacts["c"]["at"] is not None for load in loads]
+    assert found == [Code.TOUCHES if touched else Code.SOLVED for touched in touches]
+    assert 0 < sum(touches) < len(loads)
+
+
+def test_carried_obstacle_that_touches():
+    scene = Scene.from_dict(
+        {
+            **CARRIED,
+            "sections": {"s": {"EI3": 1.0}},
+            "loads": {"F": {"type": "force", "node": "B", "value": [0, -2]}},
+            "analysis": {"accuracy": 1e-8},
+        }
+    )
+    solver = solver_of(scene, **LOADS)
+    for load in (-2.5, -1.0, -0.5):
+        outcome, results = solver.solve(np.array([0.0, load]))
+        step = solve(scene.replace({"loads.F.value": [0, load]})).last
+        assert outcome.code is (Code.TOUCHES if step.contacts["c"]["at"] is None else Code.SOLVED)
+        if outcome.code is Code.SOLVED:
+            # Places are within elements of the mesh of the first load.
+            assert solver.by_name(results)["nodes.B.position"] == pytest.approx(step.position("B"), abs=1e-7)
 
 
 @needs_compiler

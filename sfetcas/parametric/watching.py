@@ -16,6 +16,7 @@ from ..description.answers import answer_name
 from ..description.obstacles import members_of
 from ..errors import SceneError
 from ..mechanics.model import Model
+from ..mechanics.singles import turned_vector
 from .arguments import Argument, Arguments
 from .results import Outputs, Results
 
@@ -66,7 +67,15 @@ def margins_of(name: str, base: Model, arguments: Sequence[Argument]) -> ca.Func
     ends = dict.fromkeys(
         node for (_, member), at in near.items() if len(at) == 2 for node in scene.members[member].nodes
     )
-    names += [f"nodes.{node}.position" for node in ends]
+    turned = "quaternion" if base.space else "angle"
+    turns = base.rotations.node_turn
+    carriers = {
+        name: contact.node
+        for name, contact in scene.contacts.items()
+        if contact.node is not None and turns[contact.node] is not None
+    }
+    names += [f"nodes.{node}.position" for node in dict.fromkeys([*ends, *carriers.values()])]
+    names += [f"nodes.{node}.{turned}" for node in dict.fromkeys(carriers.values())]
     results = Results(base, names, dict.fromkeys(flexible, tuple(x.tolist())))
     known = Arguments(scene, base, arguments, results, needed=False)
     program, p = known.program, ca.MX.sym("arguments", known.size)
@@ -81,6 +90,10 @@ def margins_of(name: str, base: Model, arguments: Sequence[Argument]) -> ca.Func
         if here is None:
             nodes = scene.members[member].nodes
             here = ca.vertcat(*(outputs.value(answer_name(f"nodes.{node}.position")) for node in nodes))
+        if contact in carriers:
+            node = carriers[contact]
+            place, turn = (outputs.value(answer_name(f"nodes.{node}.{key}")) for key in ("position", turned))
+            here = _seen(here, scene.nodes[node].position, place, turn)
         gaps = _gaps(base, contact, here) / scene.size
         gaps = _least(gaps) if len(at) > 2 else gaps
         for touched in (place for point, place in places if point.pair == (contact, (member,))):
@@ -97,7 +110,6 @@ def _refuse(base: Model, arguments: Sequence[Argument]) -> None:
     scene = base.scene
     for name, contact in scene.contacts.items():
         what = "members that touch each other" if contact.between_members else ""
-        what = what or ("an obstacle that a node carries" if contact.node is not None else "")
         what = what or ("an edge without member_radius" if scene.obstacles[name].kind == "sharp" else "")
         curved = [
             m
@@ -106,14 +118,26 @@ def _refuse(base: Model, arguments: Sequence[Argument]) -> None:
         ]
         what = what or (f"the curved rigid member {curved[0]!r}" if curved else "")
         if what:
-            message = (
-                f"found {what}, which is not exported, accepted: planes and what is round, that stay, with flexible"
-            )
+            message = f"found {what}, which is not exported, accepted: planes and what is round, with flexible"
             raise SceneError(f"{message} or straight members", ("contacts", name))
     for one in arguments:
         if one.name.startswith("contacts.") or one.numbers is not None:
             message = "found a number of an obstacle, or one that others follow, accepted beside contact: numbers of"
             raise SceneError(f"{message} loads, motions, members and nodes", ("arguments", one.name))
+
+
+def _seen(here: ca.MX, begin: Sequence[float], place: ca.MX, turn: ca.MX) -> ca.MX:
+    """Positions (n, 3), m, as an obstacle sees them that a node carries, which began at a place and is at another.
+
+    ``turn`` is the rotation of the node since then, an angle or a quaternion.
+    """
+    axes = 3 if turn.numel() > 1 else 2
+    matrix, rotate = ca.MX.eye(3), turned_vector(axes == 3)
+    for k in range(axes):
+        matrix[:axes, k] = rotate(ca.vec(turn), ca.DM.eye(axes)[:, k])
+    n = here.shape[0]
+    out = here - ca.repmat(ca.reshape(place, 1, 3), n, 1)
+    return ca.mtimes(out, matrix) + ca.repmat(ca.DM([*begin, 0.0][:3]).T, n, 1)
 
 
 def _gaps(base: Model, contact: str, here: ca.MX) -> ca.MX:
