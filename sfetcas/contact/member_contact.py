@@ -309,7 +309,7 @@ class MemberContact:
         every = list(self.gripping.set_up(source.fields, mesh, every))
         prepared = self.prepare(replace(mesh, points=tuple(every)))
         prepared.equations.redundant = False
-        pushing = self._gaps(prepared, [every[i] for i in free])
+        pushing = self.gaps(prepared, [every[i] for i in free])
         # What presses on an element does so with both its forces, if only rounding chooses.
         halves = {self.lines.element_of(mesh, point) for point in points}
         acting = np.array([i < len(points) or self.lines.element_of(mesh, every[i]) in halves - {None} for i in free])
@@ -345,13 +345,14 @@ class MemberContact:
             return correct(system, state, factor=factor, limits=limits)
 
     @staticmethod
-    def _gaps(prepared: Prepared, points: Iterable[ContactPoint]) -> Index:
+    def gaps(prepared: Prepared, points: Iterable[ContactPoint]) -> Index:
         """Numbers of the gaps of points among all residuals; with friction of their pushes, which are unknowns."""
         equations, model = prepared.equations, prepared.model
         rows = {name: equations.unknowns + i for i, name in enumerate(model.row_names)}
         forces = {name: equations.rotation_unknowns + i for i, name in enumerate(model.positions.unknowns)}
         axes = model.element.axes
-        return np.array([forces[f"{p.pressed}, across"] if p.grip else rows[p.rows(axes)[-1]] for p in points])
+        every = [forces[f"{p.pressed}, across"] if p.grip else rows[p.rows(axes)[-1]] for p in points]
+        return np.array(every, np.intp)
 
     @staticmethod
     def _rubbing(prepared: Prepared, points: Iterable[ContactPoint]) -> Index:

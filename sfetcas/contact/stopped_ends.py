@@ -84,11 +84,8 @@ class StoppedEnds:
         self.points = [replace(point, number=i) for i, point in enumerate(stopped.values())]
         self.prepared = run.prepare(replace(mesh, points=tuple(self.points)))
         self.prepared.equations.redundant = False
-        model = self.prepared.model
-        number = {name: i for i, name in enumerate(model.row_names)}
-        self.gaps = np.array([number[point.rows(model.element.axes)[-1]] for point in self.points], np.intp)
-        self.loading = way(model)
-        self._rows = self.prepared.equations.unknowns + self.gaps
+        self.loading = way(self.prepared.model)
+        self.gaps = run.gaps(self.prepared, self.points)
 
     def taken(self, state: State) -> Solved:
         """A state of the model without contact."""
@@ -121,7 +118,7 @@ class StoppedEnds:
         found = deflated(self.prepared, state, self.loading, known, step=step, correct=settled, least=least)
         if found is None:
             return None
-        pushes = np.where(system.acting, -found.state.lam[self.gaps], 0.0)
+        pushes = np.where(system.acting, system.pushes(found.state), 0.0)
         return self._held(found, pushes > LASTING * pushes.max(initial=0.0))
 
     def downhill(self, start: State, deep: float = 0.0) -> State:
@@ -154,7 +151,7 @@ class StoppedEnds:
     def _begun(self, start: State) -> tuple[State, float]:
         """A state without contact as one of the model, and how far obstacles are to be drawn back, dimensionless."""
         state = self.run.carried(self.taken(start), self.prepared)
-        gaps = self.prepared.equations.at(state, self.loading).residual[self._rows]
+        gaps = self.prepared.equations.at(state, self.loading).residual[self.gaps]
         return state, INSIDE * max(0.0, -float(gaps.min(initial=0.0)))
 
     def _drag(self, state: State, size: float) -> Drag:
@@ -162,7 +159,7 @@ class StoppedEnds:
 
     def _drawn_back(self, point: Point, by: float) -> Point:
         residual = point.residual.copy()
-        residual[self._rows] += by
+        residual[self.gaps] += by
         return replace(point, residual=residual)
 
     def _system(self, added: Callable[[State, Point], Point], acting: Array | None = None) -> OneSided:
