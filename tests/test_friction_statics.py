@@ -284,8 +284,8 @@ def test_what_lies_on_a_floor_is_pressed_all_along():
     np.testing.assert_allclose(step.contacts["floor"]["force"], [-1.0, 8.0, 0.0], atol=1e-9)
 
 
-@pytest.mark.parametrize("friction", [0.3, 0.8])
-def test_heavy_cantilever_slides_on_a_rough_floor_as_the_elastica_does(friction):
+@pytest.mark.parametrize(("friction", "accuracy"), [(0.3, 1e-3), (0.8, 1e-3), (0.3, 1e-5)])
+def test_heavy_cantilever_slides_on_a_rough_floor_as_the_elastica_does(friction, accuracy):
     """What hangs is an elastica to where all that lies pulls it back by its weight and by the force at that end."""
     weight, height = 30.0, 0.2
 
@@ -312,18 +312,21 @@ def test_heavy_cantilever_slides_on_a_rough_floor_as_the_elastica_does(friction)
                 "nodes": {"A": {"position": [0, height], "support": "clamped"}, "B": {"position": [1, height]}},
                 "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
                 "contacts": {"floor": FLOOR | {"friction": friction}},
-                "analysis": {"accuracy": 1e-3},
+                "analysis": {"accuracy": accuracy},
             }
         )
     ).last
     floor = step.contacts["floor"]
-    assert not floor["sticking"]
-    # On elements that end where it begins to lie the answer is much better than the accuracy that was asked for.
-    assert step.position("B")[0] == pytest.approx(tip, abs=1e-6)
-    # What presses within the last element, 0.02 long here, moves it by a part of that.
-    assert floor["at"][0] == pytest.approx(touches, abs=5e-3)
+    assert not np.any(floor["sticking"])
+    assert step.position("B")[0] == pytest.approx(tip, abs=accuracy)
     pressed = push + weight * (1.0 - touches)
-    np.testing.assert_allclose(floor["force"], [friction * pressed, pressed, 0.0], rtol=1e-4)
+    # Forces are two derivatives of positions.
+    force = np.sum(np.atleast_2d(floor["force"]), axis=0)
+    np.testing.assert_allclose(force, [friction * pressed, pressed, 0.0], rtol=10.0 * accuracy)
+    if accuracy < 1e-4:
+        # It is also solved for where it begins to lie.
+        np.testing.assert_allclose(floor["at"], [touches, 1.0], atol=accuracy)
+        assert step.position("B")[0] == pytest.approx(tip, abs=1e-8)
 
 
 def test_a_heavy_rope_over_a_rough_drum_stays_though_one_end_is_longer():

@@ -285,8 +285,11 @@ class MemberContact:
         With ``drag`` rotations since another state are resisted, see :class:`~sfetcas.solvers.pseudo_transient.Drag`.
         """
         numbered = self.lines.set_out(mesh, points)
-        for _ in FIRM if self.scene.rubs and points else (1.0,):
-            pressing = self._pressing(mesh, numbered, source, way, since, drag) if self.lines.keys else None
+        pressing = None
+        for count, _ in enumerate(FIRM if self.scene.rubs and points else (1.0,)):
+            # Another number seldom helps here, but where lines end.
+            if self.lines.keys and (ends or not count):
+                pressing = self._pressing(mesh, numbered, source, way, since, drag)
             if pressing is not None or not (ends and self.lines.keys):
                 pushing, near = pressing or (numbered, source)
                 set_up = self.gripping.set_up(near.fields, mesh, pushing)

@@ -31,6 +31,9 @@ __all__ = ["RoughContactSteps"]
 LEVELS = 6
 """Sequences at most."""
 
+PLAIN = 1
+"""Sequences before it is also solved for where lines end: a low accuracy does not need it."""
+
 NEARLY = 0.99
 """Share of the limit of friction from which on what touches is said to be about to slide."""
 
@@ -102,7 +105,7 @@ class RoughContactSteps:
             for a, b in itertools.pairwise(stops_between(self.scene, last, factor)):
                 now = self._known(run, run.follow(partial(on_way, a, b), now), a, b)
                 told += run.notes(a, b)
-            found.append(run.ended(now, on_way(factor, factor, 1.0)))
+            found.append(now if level <= PLAIN else run.ended(now, on_way(factor, factor, 1.0)))
             notes.append(told)
             last = factor
         return found, run, notes
