@@ -116,6 +116,7 @@ class Gripping:
             return point
         normal, vector, apart = self._normal(point, i, now), now.vectors[i], before.vectors[i]
         if point.grip is None and not point.new:
+            # Beside what touches already it has hardly moved before it touches.
             touched, share = np.zeros(3), 0.0
         elif point.grip is None or self.since is None:
             # The share of the way to this state after which they touched.

@@ -148,7 +148,7 @@ class Lines:
         )
         return frozenset(key for key in lifted if self.closest.pairs[key].stop is not None)
 
-    def halved(self, points: Iterable[ContactPoint]) -> Points:
+    def by_element(self, points: Iterable[ContactPoint]) -> Points:
         """Points with those that may press on one element alone for those of lines that press on two."""
         return tuple(
             one

@@ -32,7 +32,7 @@ from ..solvers.arclength import Curve, Tangent, bordered
 from ..solvers.between_states import turned_between
 from ..solvers.continuation import JUMPED, near_factor
 from ..solvers.newton import Converged, Limits, correct
-from ..solvers.one_sided import OneSided
+from ..solvers.one_sided import LASTING, OneSided
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
 from .closest import Closest, Near, PairKey
@@ -93,9 +93,6 @@ SMOOTH = 1e-6
 """Slope of the distance, rad, up to which a member is tangential to an obstacle at its end, and how far a place slides
 there at most, a fraction of the length.
 """
-
-LASTING = 1e-9
-"""Share of the largest contact force up to which a force of the wrong sign is rounding."""
 
 ALLOWED = 1e-3
 """Largest penetration over the sum of the radii, whatever accuracy is asked for."""
@@ -322,26 +319,23 @@ class MemberContact:
         system = OneSided(
             prepared.equations, loads, prepared.weight, None, None, resisting, pushing, acting.copy(), border=border
         )
-        found = self._chosen(system, state, source.factor)
+        found = self._by_newton(system, state, source.factor)
         rubs = self._rubbing(prepared, every)
         if not found.converged and len(rubs):
             # From where friction has not changed yet.
             known = replace(system, acting=acting, still=rubs, _tried={})
-            found = self._chosen(known, state, source.factor)
+            found = self._by_newton(known, state, source.factor)
             system = replace(known, still=system.still, _tried={})
-            found = self._chosen(system, found.state, found.loading.factor) if found.converged else found
+            found = self._by_newton(system, found.state, found.loading.factor) if found.converged else found
         if not found.converged:
             return None
-        # What pushes by rounding may as well not: on another processor it does not.
-        pushes = np.where(system.acting, system.pushes(found.state), 0.0)
-        acts = pushes > LASTING * pushes.max(initial=0.0)
-        idle = {i for i, pushed in zip(free, acts.tolist(), strict=True) if not pushed}
+        idle = {i for i, pushed in zip(free, system.pushed(found.state).tolist(), strict=True) if not pushed}
         pressed = Solved(prepared, **found._asdict())
         # Where those that slide are now: from there their pushes go on.
         kept = [point for i, point in enumerate(points_of(pressed)) if i not in idle]
         return self.lines.set_out(mesh, kept), pressed
 
-    def _chosen(self, system: OneSided, state: State, factor: float) -> Converged:
+    def _by_newton(self, system: OneSided, state: State, factor: float) -> Converged:
         """Newton's method from a near state."""
         limits = Limits(iterations=ITERATIONS if self.across is None else ACROSS, most=TURN, contraction=2.0)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -411,9 +405,7 @@ class MemberContact:
         back = np.array([self.closest.back(point) for point in model.mesh.points]) / model.scales.length
         if not back.any():
             return resisting
-        number = {name: i for i, name in enumerate(model.row_names)}
-        gaps = [number[point.rows(model.element.axes)[-1]] for point in model.mesh.points]
-        rows = prepared.equations.unknowns + np.array(gaps, np.intp)
+        rows = self.gaps(prepared, model.mesh.points)
 
         def added(state: State, point: Point) -> Point:
             residual = point.residual.copy()
@@ -880,7 +872,7 @@ class MemberContact:
         keys, self.lines.ending = self.lines.keys, self.lines.ends_within(found)
         if not self.lines.ending:
             return found
-        points = self.lines.halved(points_of(found))
+        points = self.lines.by_element(points_of(found))
         there = self.resolved(replace(found.model.mesh, points=()), points, found, way)
         near = there is not None and self.turned(found.fields, there.fields) < STRIDE
         there = self.fitted(there, way) if there is not None and near else found

@@ -54,9 +54,6 @@ DOWN, STEPS, STRIDE, STILL = 30, 15, 0.5, 0.02
 that below which the state is near to where it comes to rest.
 """
 
-LASTING = 1e-9
-"""Share of the largest push up to which one is rounding."""
-
 
 class StoppedEnds:
     """The model on a mesh in which obstacles stop the ends of elements.
@@ -118,8 +115,7 @@ class StoppedEnds:
         found = deflated(self.prepared, state, self.loading, known, step=step, correct=settled, least=least)
         if found is None:
             return None
-        pushes = np.where(system.acting, system.pushes(found.state), 0.0)
-        return self._held(found, pushes > LASTING * pushes.max(initial=0.0))
+        return self._held(found, system.pushed(found.state))
 
     def downhill(self, start: State, deep: float = 0.0) -> State:
         """Where a state without contact comes to on its way downhill through something viscous.

@@ -318,7 +318,8 @@ class Touching:
         own = np.flatnonzero(self._turns != GROUND)
         if len(own):
             q = pose.q[self._turns[own]]
-            turned[own] = _matrices(q / np.linalg.norm(q, axis=1, keepdims=True) if self.axes == 3 else q)
+            q = q / np.linalg.norm(q, axis=1, keepdims=True) if self.axes == 3 else q
+            turned[own] = np.swapaxes(quaternion.turned_by(q[:, None, :], np.eye(self.axes)), -1, -2)
         return np.einsum("nba,nb->na", turned, apart), apart, turned
 
     def _out(self, group: _Group, seen: Array) -> Array:
@@ -363,14 +364,6 @@ class Touching:
 def _length(vectors: Array) -> Array:
     """Lengths (n,) of vectors (n, axes), not zero."""
     return np.maximum(np.linalg.norm(vectors, axis=1), TINY)
-
-
-def _matrices(q: Array) -> Array:
-    """Rotation matrices (n, axes, axes)."""
-    if q.shape[1] == 4:
-        return quaternion.matrix(q)
-    c, s = np.cos(q[:, 0]), np.sin(q[:, 0])
-    return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
 
 
 def _frames(first: Array, normals: Array) -> Array:

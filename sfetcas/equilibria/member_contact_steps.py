@@ -94,10 +94,7 @@ class MemberContactSteps:
             if alone is not None:
                 return alone
         notes: tuple[str, ...] = () if pilot.model.conservative else (NO_ENERGY,)
-        # On its way all divides as what touches asks for: on the mesh that is prescribed where lines end is known then.
-        self.run.hold(())
         found, more = self._reached(pilot, factor, zero)
-        self.run.hold(self.meshes.fixed)
         self.last = (factor, found)
         return self.refined(found, factor, (*notes, *more))
 
@@ -134,6 +131,8 @@ class MemberContactSteps:
 
     def _reached(self, pilot: Prepared, factor: float, zero: Solved) -> tuple[Solved, tuple[str, ...]]:
         """The state that the loads lead to, from the last factor where that lies on the way, and notes on it."""
+        # On its way all divides as what touches asks for: where lines end is then known on a mesh that is prescribed.
+        self.run.hold(())
         begin, start = 0.0, self.run.lying(zero)
         if self.last is not None and self.last[0] * (factor - self.last[0]) >= 0.0:
             begin, start = self.last
@@ -173,6 +172,7 @@ class MemberContactSteps:
             What touches is not found on finer meshes, or forces are lost.
         """
         target, accuracy = self.meshes.target, self.meshes.accuracy
+        self.run.hold(self.meshes.fixed)
         now = found
         if self.meshes.fixed:
             now = self._onto(self.run.lines.fitted(target, points_of(now), prescribed=True)[0], now, factor)

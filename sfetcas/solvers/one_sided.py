@@ -21,13 +21,17 @@ from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
 from .newton import AtLoads, Balance
 
-__all__ = ["Border", "OneSided"]
+__all__ = ["LASTING", "Border", "OneSided"]
 
 AGAIN, TIMES = 1e-8, 2
 """Relative residual from which on a choice that was made so many times is taken: others differ from it by rounding."""
 
 ROUNDING = 1e-11
 """Share of the largest gap, and of the largest push, up to which a wrong sign is rounding."""
+
+
+LASTING = 1e-9
+"""Share of the largest push up to which another one is rounding."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,14 @@ class OneSided(AtLoads):
         """The pushes (m,) in a state."""
         values = np.concatenate([state.y, state.lam])
         return np.asarray(self._signs * values[self.pushing - self.equations.rotation_unknowns])
+
+    def pushed(self, state: State) -> Array:
+        """Which rows (m,) push in a state.
+
+        What pushes by rounding may as well not: on another processor it does not.
+        """
+        pushes = np.where(self.acting, self.pushes(state), 0.0)
+        return np.asarray(pushes > LASTING * pushes.max(initial=0.0))
 
     def seen(self, state: State, point: Point) -> Point:
         """The equations with pulls of rows that act, and gaps of those that do not where they are below zero."""
