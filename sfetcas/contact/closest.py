@@ -29,6 +29,7 @@ from ..mechanics.segments import standing, stations_of_line
 __all__ = [
     "BEHIND_EDGE",
     "NEXT_TO",
+    "ONE",
     "SAME",
     "Closest",
     "Near",
@@ -60,6 +61,9 @@ ITERATIONS, ARRIVED = 40, 1e-13
 
 SAME = 0.5
 """Minima nearer to each other than this part of the distance of the centre lines are one, along both members."""
+
+ONE = 0.2
+"""As ``SAME``, a share of that, of points that touch: such points are one."""
 
 ALIKE = 1e-9
 """Share of a distance by which a shorter one is no other: rounding is far below, the curve of a member far above."""

@@ -23,7 +23,7 @@ from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Mesh, breaks_of
 from ..mechanics.segments import SAME_CUT, standing
 from ..solvers.prepared import Solved
-from .closest import Closest, Near, Pair, PairKey
+from .closest import ONE, SAME, Closest, Near, Pair, PairKey
 
 __all__ = ["LINE", "SHORT_LINE", "Lines", "Points", "begun", "ends_of", "lies_along", "points_in", "points_of"]
 
@@ -269,7 +269,9 @@ class Lines:
             places += [x for x in self._shared(pair, points) if x not in places]
             needed = least if pair.stop is not None else LINE
             known = key in self.keys
-            if (self.chosen(key) or not any(map(slides, own))) if known else len(places) < needed:
+            # Points that have slid to where others are, or begin there, make no line.
+            apart = np.diff(np.sort(places)) * self.closest.lengths[pair.members[0]] >= ONE * SAME * pair.width
+            if (self.chosen(key) or not any(map(slides, own))) if known else 1 + apart.sum() < needed:
                 continue
             self.keys |= {key}
             longest = self._longest(pair, places)

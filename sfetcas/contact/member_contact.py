@@ -35,7 +35,7 @@ from ..solvers.newton import Converged, Limits, correct
 from ..solvers.one_sided import LASTING, OneSided
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
-from .closest import Closest, Near, PairKey
+from .closest import ONE, Closest, Near, PairKey
 from .edges import Edges
 from .gripping import FIRM, Gripping, Placed
 from .lines import LINE, SHORT_LINE, Lines, Points, begun, ends_of, points_of
@@ -642,10 +642,10 @@ class MemberContact:
                 kept.append(point)
         return [point for point in points if point in kept]
 
-    def _same(self, point: ContactPoint | Near, other: ContactPoint, share: float = 0.2) -> bool:
+    def _same(self, point: ContactPoint | Near, other: ContactPoint) -> bool:
         # What is new on an edge slides by more than its width.
         near = bool(other.edge) and other.new
-        return point.pair == other.pair and (near or self.closest.alike(point.pair, point.at, other.at, share))
+        return point.pair == other.pair and (near or self.closest.alike(point.pair, point.at, other.at, ONE))
 
     def _freed(self, fields: Fields, point: ContactPoint, ends: Collection[tuple[PairKey, float]]) -> ContactPoint:
         """A point as it slides from where it is, though not beyond ends; along a line it stays on the first member.

@@ -17,7 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..contact.closest import Near
+from ..contact.closest import ONE, Near
 from ..contact.lines import LINE, lies_along, points_in, points_of
 from ..contact.member_contact import MemberContact
 from ..description.records import enumerated
@@ -603,10 +603,6 @@ class Touching(Conditions[_At]):
 
 SAME_END = 1e-9
 """Fractions of a length by which a place is off the end at which it is: they are compared to nine digits."""
-
-ONE = 0.2
-"""Places nearer to each other than this share of what makes minima one are one, as in statics."""
-
 
 def _side(members: tuple[str, ...], one: _End) -> int:
     """Which of the members of a point is that of a condition, or took its place: pairs have an order."""
