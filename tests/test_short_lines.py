@@ -63,3 +63,13 @@ def test_short_lines_against_the_elastica(force, accuracy):
     else:
         # What presses between two places, at most a tenth of their forces here, moves them by a twelfth of its share.
         np.testing.assert_allclose([low, high], [begin, end], atol=0.1 / 12.0 * 2.0 * (end - begin))
+
+
+@pytest.mark.parametrize("off", [0.0, 3e-14, -7e-14])
+def test_a_line_whose_ends_alone_were_found_first_is_one_line(off):
+    """Between its ends its weight presses: without that it would be in the floor by less than the accuracy."""
+    begin, end, _ = lifted(0.93)
+    floor = sfetcas.solve(scene(0.93 * (1.0 + off), 1e-6)).last.contacts["floor"]
+    assert isinstance(floor["member"], str)
+    # Where a line ends is known less well than positions.
+    np.testing.assert_allclose(floor["at"], [begin, end], atol=1e-5)

@@ -308,7 +308,8 @@ def test_a_pendulum_stays_at_its_stop(dimension):
     assert (event.name, event.side, event.acts, event.turns) == ("springs.k", "low", True, True)
     assert event.impulse == pytest.approx(np.sqrt(2 * G * np.sin(0.5)), rel=1e-5)
     spring = motion.last.spring("k")
-    assert spring.travel == pytest.approx(-0.5, abs=1e-12)
+    # Stops close where they are passed by the rounding of openings, 1e-12.
+    assert spring.travel == pytest.approx(-0.5, abs=2e-12)
     assert spring.stop == pytest.approx(G * np.cos(0.5), rel=1e-9)
     assert motion.last.energy["dissipated"] == pytest.approx(G * np.sin(0.5), rel=1e-5)
 

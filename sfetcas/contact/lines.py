@@ -308,10 +308,12 @@ class Lines:
             mesh = mesh.refined(marks | {first: long})
         return mesh
 
-    def forget(self, mesh: Mesh, points: Iterable[ContactPoint]) -> None:
-        """What touches at places that all slide, or will, is no line."""
+    def forget(self, found: Solved, mesh: Mesh, points: Iterable[ContactPoint]) -> None:
+        """What touches at places that all slide, or will, is no line, unless a member lies between them in a state."""
         on = {p.pair for p in points if self.has(p) and standing(mesh, p, 0) is not None}
-        self.keys = frozenset(key for key in self.keys if key in on or not self.chosen(key))
+        lost = {key for key in self.keys - on if self.chosen(key)}
+        lies = self.followed(found) if lost else {}
+        self.keys -= {key for key in lost if all(len(stretch) == 1 for stretch in lies[key])}
 
     # -- ends -------------------------------------------------------------------------------------
 

@@ -558,7 +558,7 @@ class MemberContact:
                 points, changes = self._changed(found, tried, careful, ends)
                 several = changes > 1 and not careful
                 if ends:
-                    self.lines.forget(mesh, points)
+                    self.lines.forget(found, mesh, points)
                 if not changes:
                     return found
                 if changes == 1:
