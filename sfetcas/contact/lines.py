@@ -192,7 +192,8 @@ class Lines:
         for point in laid:
             pair = point.pair
             if not all(point.sides):
-                taken.setdefault(pair, self._without_pressure(mesh, points, pair))
+                if pair not in taken:
+                    taken[pair] = self._without_pressure(mesh, points, pair)
                 found = self.element_of(mesh, point)
                 no = found is not None and found[1] in taken[pair]
             else:
