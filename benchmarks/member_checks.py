@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sfetcas.contact.closest import NEXT_TO
+from sfetcas.contact.pairs import NEXT_TO
 from sfetcas.description.contacts import contact_radius
 from sfetcas.description.obstacles import members_of
 from sfetcas.description.scene import Scene

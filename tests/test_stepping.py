@@ -497,7 +497,7 @@ def _curve(lines, equations, state):
 @pytest.mark.parametrize("dimension", ["plane", "space"])
 def test_lines_have_the_derivatives_of_their_positions(dimension):
     equations, state = _near(dimension)
-    lines, rng = Lines(equations.tables), np.random.default_rng(0)
+    lines, rng = Lines(equations.model, equations.tables), np.random.default_rng(0)
     change = np.concatenate([0.3 * rng.normal(size=equations.unknowns), np.zeros(equations.rows)])
     state = equations.moved(state, change)
     along = Along(np.arange(len(lines.owner)), rng.uniform(size=len(lines.owner)))
@@ -552,9 +552,8 @@ def test_gaps_and_slips_gain_what_their_rows_say(dimension):
 @pytest.mark.parametrize("dimension", ["plane", "space"])
 def test_the_same_minima_are_found_as_by_the_search_of_statics(dimension):
     equations, state = _near(dimension)
-    lines = Lines(equations.tables)
-    closest, curve = Closest(equations.model.scene), _curve(lines, equations, state)
-    nearby = Nearby(lines, closest)
+    nearby = Closest(equations.model.scene).nearby(equations.model, equations.tables)
+    closest, curve = Closest(equations.model.scene), _curve(nearby.lines, equations, state)
     reach, unit = 0.1, equations.model.scales.length
     found = nearby.found(curve, reach / unit, ends=False)
     gaps = np.sort(nearby.gaps(curve, found)) * unit

@@ -1,48 +1,39 @@
 """Where members are nearest to each other and to obstacles: local minima of the distance from their centre lines.
 
-Each member is sampled as a chain of straight pieces.  A tree of their middles gives the pairs of pieces that may be
-near, so that the effort grows with the number of members and of what is near, not with that of all pairs.  From each
-pair that is nearer than those beside it, Newton's method leads to the minimum between the curves.
-
-A member is not near to itself, or to a member that continues it, over less than half a turn of the smallest circle that
-its surface allows: no two places nearer to each other along the members can touch.
+Between members they are found for all pairs at once, see :mod:`~sfetcas.contact.nearby`.  The distance from an obstacle
+is seen at samples along each member; from each that is nearer than those beside it Newton's method leads to a minimum.
 """
 
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from .. import tolerances
 from ..description.contacts import contact_radius, pairs_of
-from ..description.obstacles import Obstacle, edge_side, members_of, takes_part
+from ..description.obstacles import edge_side, members_of, takes_part
 from ..description.scene import Scene
-from ..mathematics.arrays import TINY, Array, Index
+from ..mathematics.arrays import TINY, Array
+from ..mechanics.balance import three
+from ..mechanics.center_lines import Curve, Lines
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Mesh
+from ..mechanics.model import Model
 from ..mechanics.segments import standing, stations_of_line
+from ..mechanics.tables import Tables
+from .nearby import ALIKE, ITERATIONS, Nearby, Places
+from .pairs import SAME, Near, Pair, PairKey
 
-__all__ = [
-    "BEHIND_EDGE",
-    "NEXT_TO",
-    "ONE",
-    "SAME",
-    "Closest",
-    "Near",
-    "Pair",
-    "PairKey",
-    "answers",
-    "closest_on_pieces",
-    "downhill",
-    "locally_least",
-]
+__all__ = ["BEHIND_EDGE", "Closest", "answers"]
 
-PIECES = 4
-"""Straight pieces of an element at least."""
+PIECES, COARSE = 4, 2
+"""Straight pieces of an element at least, and how many times fewer and longer they are in a coarse search: chains then
+find minima some radii apart.
+"""
 
 SLENDER = 1.0
 """Length of a piece at most, over the radius of its member: chains then find minima one radius apart."""
@@ -50,30 +41,14 @@ SLENDER = 1.0
 MOST_PIECES = 1_000
 """Straight pieces of a member at most, for which slender ones are longer."""
 
-LEAST = 1e-6
-"""Least curvature of half the square of the distance with which Newton's steps are made; it is one across a line."""
-
 BEND = 1e-6
 """Fraction of a length over which tangents are differenced for the curvature of a centre line."""
 
-ITERATIONS, ARRIVED = 40, 1e-13
-"""Newton's steps at most, and fraction of the length of the longer member that is as good as none."""
-
-SAME = 0.5
-"""Minima nearer to each other than this part of the distance of the centre lines are one, along both members."""
-
-ONE = 0.2
-"""As ``SAME``, a share of that, of points that touch: such points are one."""
-
-ALIKE = 1e-9
-"""Share of a distance by which a shorter one is no other: rounding is far below, the curve of a member far above."""
+ARRIVED = 1e-13
+"""Fraction of the length of a member that is as good as none."""
 
 LEVEL = 1e-13
 """Slope of the distance from an obstacle that is rounding, rad."""
-
-NEXT_TO = 0.95
-"""Part of half a turn of the smallest circle within which places along members are not near to each other."""
-
 
 NARROW = 1e-3
 """Share of the length of a member over which minima of its distance from an obstacle are one."""
@@ -81,110 +56,10 @@ NARROW = 1e-3
 BEHIND_EDGE = 0.2
 """Distance behind an edge from which a member is not in contact with it, share of the size of the scene."""
 
-LEFT = 1e-3
-"""Share of the distance of what is round, or of two members, that is left where these are drawn back."""
-
 LYING, SAMPLES = (1e-8, 1e-6), 7
 """Shares of the size of the scene between which that is up to which a gap between touches is none, and number of places
 where it is seen.
 """
-
-PairKey = tuple[str, tuple[str, ...]]
-"""Name of a contact, and the members that touch each other, or the one that touches its obstacle."""
-
-
-@dataclass(frozen=True)
-class Near:
-    """A local minimum of the distance between two members, or of a member from an obstacle.
-
-    Attributes
-    ----------
-    contact : str
-    members : (str, str) or (str,)
-    at : tuple of float
-        Fractions of their lengths.
-    normal : ndarray (3,)
-        Unit vector from the second centre line, or the obstacle, to the first, as an obstacle that moves sees it.
-    gap : float
-        Distance of the surfaces, m; below zero where they penetrate.
-    distance, edge : float
-        As of :class:`~sfetcas.mechanics.mesh.ContactPoint`.
-    """
-
-    contact: str
-    members: tuple[str, ...]
-    at: tuple[float, ...]
-    normal: Array
-    gap: float
-    distance: float
-    edge: float = 0.0
-
-    @property
-    def pair(self) -> PairKey:
-        """What it is a minimum of."""
-        return self.contact, self.members
-
-
-@dataclass(frozen=True)
-class Pair:
-    """Two members that may touch, one that may touch itself, or one that may touch an obstacle.
-
-    Attributes
-    ----------
-    contact : str
-    members : (str, str) or (str,)
-    distance : float
-        As of :class:`~sfetcas.mechanics.mesh.ContactPoint`.
-    width : float
-        Length along the members within which minima are one, over ``SAME``, m.
-    stop : Obstacle or None
-        It is where it is in the undeformed scene: of one that moves what touches it is seen from it.
-    ends : (bool, bool)
-        Whether an obstacle can push the ends of the member.
-    edge : float
-        As of :class:`~sfetcas.mechanics.mesh.ContactPoint`.
-    """
-
-    contact: str
-    members: tuple[str, ...]
-    distance: float
-    width: float
-    stop: Obstacle | None = None
-    ends: tuple[bool, bool] = (True, True)
-    edge: float = 0.0
-
-    @property
-    def key(self) -> PairKey:
-        """Its name."""
-        return self.contact, self.members
-
-    @property
-    def turn(self) -> float:
-        """Radius of what a member may be bent round, m: of an obstacle, or of its own surface on an edge."""
-        if self.stop is None or self.stop.kind != "round":
-            return np.inf
-        return self.stop.radius or self.distance
-
-    @property
-    def passable(self) -> bool:
-        """Whether members may have passed each other or the obstacle: what is beyond a plane is inside of it."""
-        return self.stop is None or (self.stop.kind == "round" and self.stop.sign > 0.0)
-
-    def drawn_back(self, by: float) -> Pair:
-        """The same where surfaces are drawn back by a length, m: members are on one side of what is round as before.
-
-        An edge, which has no inside, stays.
-        """
-        most = 0.0 if self.edge else (1.0 - LEFT) * self.distance if self.passable else np.inf
-        return replace(self, distance=self.distance - min(by, most))
-
-    @property
-    def normal(self) -> tuple[float, float, float] | None:
-        """The direction along which the distance is always measured; None where that is another one at each place."""
-        if self.stop is None or self.stop.kind != "flat":
-            return None
-        x, y, z = self.stop.normal.tolist()
-        return x, y, z
 
 
 class Closest:
@@ -214,10 +89,11 @@ class Closest:
         self.sides = {pair.key: pair.edge for pair in pairs if pair.edge}
         # A state is looked at as the end of a step, and as the begin of another one.
         self._passing = weakref.WeakKeyDictionary[Fields, dict[PairKey, tuple[Array, Array, Array]]]()
+        self._nearby = weakref.WeakKeyDictionary[Model, Nearby]()
+        self._curves = weakref.WeakKeyDictionary[Fields, Curve]()
         self._courses = weakref.WeakKeyDictionary[Fields, dict[str, tuple[Array, Array, Array]]]()
         self._between = [pair for pair in pairs if pair.stop is None]
         self.members = sorted({member for pair in pairs for member in pair.members})
-        self._tree_members = sorted({member for pair in self._between for member in pair.members})
         self.lengths = {member: scene.center_lines[member].length for member in self.members}
         self.least = dict.fromkeys(self.members, np.inf)
         for pair in pairs:
@@ -248,33 +124,70 @@ class Closest:
         """Whether a member is straight, and stays so."""
         return self.scene.members[member].type == "rigid" and self.scene.center_lines[member].turning == 0.0
 
-    def samples(self, fields: Fields, member: str) -> Array:
+    def samples(self, mesh: Mesh, member: str, coarse: int = 1) -> Array:
         """Fractions (n,) of the length of a member between which it is nearly straight."""
-        cuts = fields.model.mesh.cuts[member]
-        if self.stiff(member):
+        cuts = mesh.cuts[member]
+        if self.stiff(member) and coarse == 1:
             # What is straight, and stays so, needs no short pieces; between shorter ones fewer may be near.
             return np.linspace(0.0, 1.0, PIECES + 1)
-        each = np.diff(cuts) * self.lengths[member] / (SLENDER * self.least[member])
+        each = np.diff(cuts) * self.lengths[member] / (coarse * SLENDER * self.least[member])
         most = max(PIECES, MOST_PIECES // (len(cuts) - 1))
-        counts = np.clip(np.ceil(each), PIECES, most).astype(int)
+        counts = np.clip(np.ceil(each), PIECES // coarse, most).astype(int)
         parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(cuts, cuts[1:], counts, strict=False)]
         return np.append(np.concatenate(parts), 1.0)
 
     def found(self, fields: Fields, reach: float, pairs: Sequence[Pair] | None = None) -> list[Near]:
         """All minima, of given pairs or of all, at which surfaces are nearer to each other than ``reach``, m."""
         pairs = list(self.pairs.values()) if pairs is None else pairs
-        if not pairs:
-            return []
-        x = {member: self.samples(fields, member) for member in self.members}
-        near = self._beside_obstacles(fields, x, reach, [pair for pair in pairs if pair.stop is not None])
-        between = [pair for pair in pairs if pair.stop is None]
-        if not between:
-            return near
-        points = {member: fields.positions(member, x[member]) for member in self._tree_members}
-        longest = max(float(np.linalg.norm(np.diff(p, axis=0), axis=1).max()) for p in points.values())
-        for pair, at in self._candidates(points, x, reach, between, longest):
-            near += self._minima(fields, pair, at, reach, longest)
+        stopped = [pair for pair in pairs if pair.stop is not None]
+        x = {member: self.samples(fields.model.mesh, member) for pair in stopped for member in pair.members}
+        near, keys = self._beside_obstacles(fields, x, reach, stopped), {p.key for p in pairs if p.stop is None}
+        if keys:
+            nearby, curve = self.nearby(fields.model), self._curve(fields)
+            found = nearby.found(curve, reach / fields.model.scales.length, ends=False)
+            near += self._once_each(one for one in self._told(nearby, curve, found) if one.pair in keys)
         return near
+
+    def nearby(self, model: Model, tables: Tables | None = None) -> Nearby:
+        """The search among the members of a model, coarse where the ``tables`` of a motion are given."""
+        if model not in self._nearby:
+            coarse = 1 if tables is None else COARSE
+
+            def samples(member: str) -> Array:
+                return self.samples(model.mesh, member, coarse)
+
+            self._nearby[model] = Nearby(Lines(model, tables), self._between, samples)
+        nearby = self._nearby[model]
+        nearby.distance[:] = [self.pairs[pair.key].distance / model.scales.length for pair in self._between]
+        return nearby
+
+    def _curve(self, fields: Fields) -> Curve:
+        """The centre lines in a state."""
+        if fields not in self._curves:
+            self._curves[fields] = self.nearby(fields.model).lines.of(fields)
+        return self._curves[fields]
+
+    def _told(self, nearby: Nearby, curve: Curve, places: Places) -> list[Near]:
+        """Places on two members, the nearest of each pair first."""
+        vectors, unit = three(nearby.between(curve, places)), nearby.lines.unit
+        apart = np.linalg.norm(vectors, axis=1)
+        normals = vectors / np.maximum(apart, TINY)[:, None]
+        at = np.stack([nearby.lines.fractions(along) for along in (places.one, places.other)], axis=1).tolist()
+        pairs = [self.pairs[nearby.pairs[k].key] for k in places.pairs.tolist()]
+        gaps = [unit * a - pair.distance for a, pair in zip(apart.tolist(), pairs, strict=True)]
+        return [
+            Near(pairs[i].contact, pairs[i].members, tuple(at[i]), normals[i], gaps[i], pairs[i].distance)
+            for i in np.lexsort((apart, places.pairs)).tolist()
+        ]
+
+    def _once_each(self, found: Iterable[Near]) -> list[Near]:
+        """Minima without those that are as good as nearer ones."""
+        kept: dict[PairKey, list[Near]] = {}
+        for near in found:
+            known = kept.setdefault(near.pair, [])
+            if not any(self.alike(near.pair, near.at, other.at) for other in known):
+                known.append(near)
+        return [near for known in kept.values() for near in known]
 
     def gap(self, fields: Fields, contact: str) -> float | None:
         """Smallest distance of the surfaces of a contact, m; None of members that are nowhere near to each other."""
@@ -342,7 +255,7 @@ class Closest:
         """Fractions (n,) of the length of a member, and positions (n, 3), m, and slopes (n, 3) there."""
         known = self._courses.setdefault(fields, {})
         if member not in known:
-            x = self.samples(fields, member)
+            x = self.samples(fields.model.mesh, member)
             known[member] = x, fields.positions(member, x), fields.slopes(member, x)
         return known[member]
 
@@ -439,87 +352,7 @@ class Closest:
             curvature += stop.sign * (along - slope**2) / apart
         return slope, curvature
 
-    # -- pieces -----------------------------------------------------------------------------------
-
-    def _candidates(
-        self, points: dict[str, Array], x: dict[str, Array], reach: float, pairs: Sequence[Pair], longest: float
-    ) -> Iterator[tuple[Pair, Array]]:
-        """For each pair of members places (2, n) on both where pieces are nearer to each other than those beside them.
-
-        Pieces of one member that follow each other are among those that are compared: beside them nothing is nearest.
-        """
-        from scipy.spatial import cKDTree
-
-        middles = [0.5 * (points[member][1:] + points[member][:-1]) for member in self._tree_members]
-        starts = np.concatenate([[0], np.cumsum([len(part) for part in middles])])
-        owners = np.repeat(np.arange(len(middles)), np.diff(starts))
-        # A piece is at most half of it from its middle, and its arc rises above it by less than a quarter.
-        limit = self.largest + reach + 1.5 * longest
-        found = cKDTree(np.concatenate(middles)).query_pairs(limit, output_type="ndarray")
-        one, other = owners[found[:, 0]], owners[found[:, 1]]
-        number = {member: k for k, member in enumerate(self._tree_members)}
-        for pair in pairs:
-            (a, b), (first, second) = (number[m] for m in pair.members), pair.members
-            chosen = found[(np.minimum(one, other) == min(a, b)) & (np.maximum(one, other) == max(a, b))]
-            if not len(chosen):
-                continue
-            # The tree gives the lower number first.
-            i, j = (chosen if a <= b else chosen[:, ::-1]).T - np.array([[starts[a]], [starts[b]]])
-            p, r = points[first], points[second]
-            s, t, distances = closest_on_pieces(p[i], p[i + 1], r[j], r[j + 1])
-            least = locally_least(i, j, distances, len(r)) & (distances < pair.distance + reach + 0.5 * longest)
-            at = np.array([x[first][i] + s * (x[first][i + 1] - x[first][i]), x[second][j] + t * np.diff(x[second])[j]])
-            least &= ~self._next_to(pair, *at)
-            if least.any():
-                yield pair, at[:, least]
-
-    def _next_to(self, pair: Pair, s: Array, t: Array) -> Array:
-        """Whether places (n,) on both members are so near to each other along the members that they cannot touch."""
-        a, b = pair.members
-        limit = NEXT_TO * 0.5 * np.pi * pair.distance
-        if a == b:
-            return np.asarray(np.abs(s - t) * self.lengths[a] < limit)
-        found = np.zeros(len(s), bool)
-        one, other = self.scene.members[a].nodes, self.scene.members[b].nodes
-        for i, node in enumerate(one):
-            for k, same in enumerate(other):
-                if node == same:
-                    along = np.abs(s - i) * self.lengths[a] + np.abs(t - k) * self.lengths[b]
-                    found |= along < limit
-        return found
-
-    # -- curves -----------------------------------------------------------------------------------
-
-    def _minima(self, fields: Fields, pair: Pair, at: Array, reach: float, longest: float) -> Iterator[Near]:
-        """Minima between the curves from places (2, n) on both, in steps of some length (m) at most; each once."""
-        a, b = pair.members
-        lengths = np.array([[self.lengths[a]], [self.lengths[b]]])
-        at = np.clip(at, 0.0, 1.0)
-        begin = at.copy()
-        for _ in range(ITERATIONS):
-            slope, curvature, apart = self._half_square(fields, pair, at)
-            step = downhill(slope, curvature, at) / lengths
-            # As long as the pieces at most: a minimum is not far from where pieces are nearest.
-            limit = np.maximum(0.25 * apart, longest) / lengths
-            step = np.clip(step, -limit, limit)
-            after = np.clip(at + step, 0.0, 1.0)
-            moved, at = np.abs(after - at).max(initial=0.0), after
-            if moved < ARRIVED:
-                break
-        slope, curvature, apart, normals = self._distance(fields, pair, at)
-        known: list[tuple[float, float]] = []
-        order = np.argsort(apart, kind="stable")
-        far = np.abs(at - begin).max(axis=0, initial=0.0) if at.size else np.zeros(0)
-        for i in order.tolist():
-            if apart[i] >= pair.distance + reach or far[i] > 0.5:
-                continue
-            if self._next_to(pair, at[0, [i]], at[1, [i]])[0]:
-                continue
-            place = (float(at[0, i]), float(at[1, i]))
-            if any(self.alike(pair.key, place, other) for other in known):
-                continue
-            known.append(place)
-            yield Near(pair.contact, pair.members, place, normals[i], float(apart[i]) - pair.distance, pair.distance)
+    # -- between members --------------------------------------------------------------------------
 
     def along(self, fields: Fields, pair: Pair, mesh: Mesh, reach: float) -> list[Near]:
         """Of the ends of elements of the first member of a pair on some mesh those at which the second one is nearer
@@ -554,40 +387,15 @@ class Closest:
                 Near(pair.contact, pair.members, (float(stations[i]),), normals[i], float(gaps[i]), pair.distance)
                 for i in np.flatnonzero((gaps < reach) & ~held).tolist()
             ]
-        first, second = pair.members
-        x = self.samples(fields, second)
-        here, points = fields.positions(first, stations), fields.positions(second, x)
-        begin, chords = points[:-1], np.diff(points, axis=0)
-        out = here[:, None, :] - begin[None, :, :]
-        share = np.clip(np.einsum("npi,pi->np", out, chords) / np.einsum("pi,pi->p", chords, chords), 0.0, 1.0)
-        t = x[:-1] + share * np.diff(x)
-        distances = np.linalg.norm(out - share[:, :, None] * chords, axis=2)
-        if first == second:
-            near = (t - stations[:, None]) * self.lengths[first] < NEXT_TO * 0.5 * np.pi * pair.distance
-            distances = np.where(near, np.inf, distances)
-        best = np.argmin(distances, axis=1)
-        longest = float(np.linalg.norm(chords, axis=1).max())
-        close = distances[np.arange(len(best)), best] < pair.distance + reach + 0.5 * longest
-        at = np.array([stations, t[np.arange(len(best)), best]])[:, close]
-        if not at.size:
-            return []
-        length = self.lengths[second]
-        for _ in range(ITERATIONS):
-            slope, curvature, _ = self._half_square(fields, pair, at)
-            step = -slope[1] / np.maximum(np.abs(curvature[1, 1]), LEAST)
-            step = np.clip(step, -longest, longest) / length
-            after = np.clip(at[1] + step, 0.0, 1.0)
-            moved, at[1] = np.abs(after - at[1]).max(), after
-            if moved < ARRIVED:
-                break
-        _, _, apart, normals = self._distance(fields, pair, at)
-        chosen = (apart < pair.distance + reach) & ~self._next_to(pair, *at) & (at[1] > 0.0) & (at[1] < 1.0)
-        if first == second:
-            chosen &= at[0] < at[1]
-        return [
-            Near(pair.contact, pair.members, (float(s), float(t)), n, float(a) - pair.distance, pair.distance)
-            for s, t, n, a in zip(at[0][chosen], at[1][chosen], normals[chosen], apart[chosen], strict=True)
-        ]
+        nearby, curve, unit = self.nearby(fields.model), self._curve(fields), fields.model.scales.length
+        chosen, places = nearby.beside(curve, pair, stations, (pair.distance + reach) / unit)
+        there, vectors = nearby.lines.fractions(places.other), three(nearby.between(curve, places)) * unit
+        apart, first = np.linalg.norm(vectors, axis=1), stations[chosen]
+        own = (apart < pair.distance + reach) & (there > 0.0) & (there < 1.0)
+        if len(set(pair.members)) == 1:
+            own &= first < there
+        places_of = zip(first[own].tolist(), there[own].tolist(), vectors[own], apart[own].tolist(), strict=True)
+        return [Near(*pair.key, (s, t), v / max(a, TINY), a - pair.distance, pair.distance) for s, t, v, a in places_of]
 
     def alike(self, pair: PairKey, one: tuple[float, ...], other: tuple[float, ...], share: float = 1.0) -> bool:
         """Whether two places of a pair are as good as one, or so near as a share of that."""
@@ -599,39 +407,23 @@ class Closest:
         pair = self.pairs[key]
         if pair.stop is not None:
             return self._slopes(fields, pair, np.array(at))[0]
-        return self._distance(fields, pair, np.array(at)[:, None])[0][:, 0]
-
-    def _distance(self, fields: Fields, pair: Pair, at: Array) -> tuple[Array, Array, Array, Array]:
-        """Slope (2, n) and curvature (2, 2, n) of the distance by both arc lengths, distance (n,), normals (n, 3)."""
-        a, b = pair.members
-        r = [fields.positions(m, x) for m, x in zip((a, b), at, strict=True)]
-        t = [fields.slopes(m, x) for m, x in zip((a, b), at, strict=True)]
-        k = [self._curvature(fields, m, x) for m, x in zip((a, b), at, strict=True)]
-        between = r[0] - r[1]
-        apart = np.maximum(np.linalg.norm(between, axis=1), TINY)
-        n = between / apart[:, None]
-        along = np.stack([np.einsum("ni,ni->n", t[0], n), -np.einsum("ni,ni->n", t[1], n)])
-        both = np.einsum("ni,ni->n", t[0], t[1])
-        curvature = np.empty((2, 2, len(apart)))
-        first, second = (np.einsum("ni,ni->n", one, one) for one in t)
-        curvature[0, 0] = (first - along[0] ** 2) / apart + np.einsum("ni,ni->n", n, k[0])
-        curvature[1, 1] = (second - along[1] ** 2) / apart - np.einsum("ni,ni->n", n, k[1])
-        curvature[0, 1] = curvature[1, 0] = (-both - along[0] * along[1]) / apart
-        return along, curvature, apart, n
+        slope, _, apart = self._half_square(fields, pair.members, at)
+        return np.asarray(slope / apart)
 
     def half_square(self, fields: Fields, members: tuple[str, str], at: tuple[float, float]) -> tuple[Array, Array]:
         """Slope (2,), m, and curvature (2, 2) of half the square of the distance of two members by both arc lengths."""
-        pair = Pair("", members, 0.0, 0.0)
-        slope, curvature, _ = self._half_square(fields, pair, np.array(at)[:, None])
-        return slope[:, 0], curvature[:, :, 0]
+        slope, curvature, _ = self._half_square(fields, members, at)
+        return slope, curvature
 
-    def _half_square(self, fields: Fields, pair: Pair, at: Array) -> tuple[Array, Array, Array]:
-        """Slope (2, n), m, and curvature (2, 2, n) of half the square of the distance, and the distance (n,), m.
-
-        Its minima are those of the distance, which has a corner where centre lines cross.
-        """
-        slope, curvature, apart, _ = self._distance(fields, pair, at)
-        return apart * slope, apart * curvature + slope[:, None] * slope[None, :], apart
+    def _half_square(
+        self, fields: Fields, members: tuple[str, ...], at: tuple[float, ...]
+    ) -> tuple[Array, Array, float]:
+        """The same, and the distance, m."""
+        nearby, unit = self.nearby(fields.model), fields.model.scales.length
+        numbers = (nearby.lines.members.index(member) for member in members)
+        one, other = (nearby.lines.at(number, np.array([x])) for number, x in zip(numbers, at, strict=True))
+        slope, curvature, apart = nearby.half_square(self._curve(fields), one, other)
+        return unit * slope[:, 0], curvature[:, :, 0], unit * float(apart[0])
 
     def _curvature(self, fields: Fields, member: str, x: Array) -> Array:
         """Vectors of curvature (n, 3) of a centre line, 1/m."""
@@ -639,61 +431,6 @@ class Closest:
         first, last = np.split(fields.tangents(member, np.concatenate([low, high])), 2)
         change = last - first
         return np.asarray(change / ((high - low) * self.lengths[member])[:, None])
-
-
-def downhill(slope: Array, curvature: Array, at: Array) -> Array:
-    """Steps (2, n) in both arc lengths, m, towards the minimum; none beyond an end of a member.
-
-    Downhill also where the distance is curved the other way, or not at all: of the curvatures the sizes are taken.
-    """
-    free = ~(((at <= 0.0) & (slope > 0.0)) | ((at >= 1.0) & (slope < 0.0)))
-    both = free.all(axis=0)
-    mean, half = 0.5 * (curvature[0, 0] + curvature[1, 1]), 0.5 * (curvature[0, 0] - curvature[1, 1])
-    across = np.where(both, curvature[0, 1], 0.0)
-    root = np.hypot(half, across)
-    sizes = np.maximum(np.abs([mean + root, mean - root]), LEAST)
-    angle = 0.5 * np.arctan2(across, half)
-    c, s = np.cos(angle), np.sin(angle)
-    first, second = (c * slope[0] + s * slope[1]) / sizes[0], (c * slope[1] - s * slope[0]) / sizes[1]
-    together = -np.array([c * first - s * second, s * first + c * second])
-    alone = -slope / np.maximum(np.abs([curvature[0, 0], curvature[1, 1]]), LEAST)
-    return np.where(both, together, np.where(free, alone, 0.0))
-
-
-def locally_least(i: Index, j: Index, distances: Array, columns: int) -> Array:
-    """Of pairs of pieces those that are not farther apart than any pair beside them; of equal ones the first."""
-    width = columns + 2
-    keys = (i + 1) * width + j + 1
-    order = np.argsort(keys)
-    ordered, values = keys[order], distances[order]
-    least = np.ones(len(keys), bool)
-    for di in (-1, 0, 1):
-        for dj in (-1, 0, 1):
-            if di or dj:
-                wanted = keys + di * width + dj
-                place = np.clip(np.searchsorted(ordered, wanted), 0, len(ordered) - 1)
-                beside = np.where(ordered[place] == wanted, values[place], np.inf)
-                # Where members are parallel, rounding shall not make a minimum of each piece.
-                earlier = di < 0 or (di == 0 and dj < 0)
-                least &= distances < beside * (1.0 - ALIKE) if earlier else distances <= beside * (1.0 + ALIKE)
-    return least
-
-
-def closest_on_pieces(p: Array, p_end: Array, r: Array, r_end: Array) -> tuple[Array, Array, Array]:
-    """Where straight pieces (n, 3) are nearest to each other, fractions (n,) of both, and the distance (n,).
-
-    Source: Ericson 2005, Real-Time Collision Detection, section 5.1.9.
-    """
-    d1, d2, w = p_end - p, r_end - r, p - r
-    a, e = np.einsum("ni,ni->n", d1, d1), np.einsum("ni,ni->n", d2, d2)
-    b, c, f = np.einsum("ni,ni->n", d1, d2), np.einsum("ni,ni->n", d1, w), np.einsum("ni,ni->n", d2, w)
-    det = a * e - b * b
-    # Pieces in one direction are nearest all along: their middles stand for them.
-    parallel = det <= 1e-12 * a * e
-    s = np.where(parallel, 0.5, np.clip((b * f - c * e) / np.where(parallel, 1.0, det), 0.0, 1.0))
-    t = np.clip((b * s + f) / np.maximum(e, TINY), 0.0, 1.0)
-    s = np.clip((b * t - c) / np.maximum(a, TINY), 0.0, 1.0)
-    return s, t, np.linalg.norm(w + s[:, None] * d1 - t[:, None] * d2, axis=1)
 
 
 def answers(fields: Fields, error: float | None = None) -> dict[str, dict[str, Any]]:

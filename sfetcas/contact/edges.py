@@ -18,7 +18,8 @@ from ..mathematics.arrays import TINY, Array
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint
 from ..mechanics.segments import SAME_CUT
-from .closest import Closest, Near, Pair, PairKey
+from .closest import Closest
+from .pairs import Near, Pair, PairKey
 
 __all__ = ["Edges"]
 

@@ -18,7 +18,8 @@ from ..mechanics.contact_joints import directions_along
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import YIELDING, ContactPoint, Grip, Mesh, Vector
 from ..mechanics.segments import stations_of_line
-from .closest import Closest, Near
+from .closest import Closest
+from .pairs import Near
 
 __all__ = ["FIRM", "Gripping", "Placed"]
 

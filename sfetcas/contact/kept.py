@@ -25,9 +25,9 @@ from ..mechanics.mesh import ContactPoint, Mesh, breaks_of
 from ..mechanics.segments import SAME_CUT, beside_line
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.redundancy import redundant
-from .closest import Near, Pair, PairKey
 from .lines import Points, points_of
 from .member_contact import MemberContact
+from .pairs import Near, Pair, PairKey
 
 __all__ = ["Kept"]
 

@@ -23,7 +23,8 @@ from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Mesh, breaks_of
 from ..mechanics.segments import SAME_CUT, standing
 from ..solvers.prepared import Solved
-from .closest import ONE, SAME, Closest, Near, Pair, PairKey
+from .closest import Closest
+from .pairs import ONE, SAME, Near, Pair, PairKey
 
 __all__ = ["LINE", "SHORT_LINE", "Lines", "Points", "begun", "ends_of", "lies_along", "points_in", "points_of"]
 

@@ -35,10 +35,11 @@ from ..solvers.newton import Converged, Limits, correct
 from ..solvers.one_sided import LASTING, OneSided
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
-from .closest import ONE, Closest, Near, PairKey
+from .closest import Closest
 from .edges import Edges
 from .gripping import FIRM, Gripping, Placed
 from .lines import LINE, SHORT_LINE, Lines, Points, begun, ends_of, points_of
+from .pairs import ONE, Near, PairKey
 
 __all__ = ["FITS", "MemberContact", "Way"]
 
@@ -700,7 +701,7 @@ class MemberContact:
         pairs = [pair for pair in self.closest.pairs.values() if pair.passable]
         moved = 0.0
         for member in {member for pair in pairs for member in pair.members}:
-            x = self.closest.samples(after, member)
+            x = self.closest.samples(after.model.mesh, member)
             places = after.positions(member, x), before.positions(member, x)
             seen = {pair.contact for pair in pairs if member in pair.members}
             for contact in seen:

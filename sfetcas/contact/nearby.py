@@ -1,34 +1,36 @@
-"""Where members are near to each other, of all members of a scene at once, for motions with many touches.
+"""Where members are near to each other: local minima of the distance of their centre lines, of all pairs at once.
 
-The minima are those of :mod:`~sfetcas.contact.closest`, found for all pairs of members in the same few operations of
-arrays, along the polynomials of :mod:`~sfetcas.mechanics.center_lines`.  The ends of elements that are near to another
-member are given as well: members that are nearly parallel touch along lines, where a minimum says little.  Lengths
-are dimensionless.
+Each member is a chain of straight pieces.  A tree of their middles gives the pairs of pieces that may be near, so that
+the effort grows with the number of members and of what is near, not with that of all pairs.  From each pair that is
+nearer than those beside it, Newton's method leads to the minimum between the curves, see
+:mod:`~sfetcas.mechanics.center_lines`.  The ends of elements that are near to another member are given as well: members
+that are nearly parallel touch along lines, where a minimum says little.  Lengths are dimensionless.
+
+A member is not near to itself, or to a member that continues it, over less than half a turn of the smallest circle that
+its surface allows: no two places nearer to each other along the members can touch.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..mathematics.arrays import TINY, Array, Index
 from ..mechanics.center_lines import Along, Curve, Lines
-from .closest import NEXT_TO, SAME, Closest, closest_on_pieces, downhill, locally_least
+from .pairs import NEXT_TO, SAME, Pair
 
-__all__ = ["Nearby", "Places"]
-
-PIECES, MOST_PIECES = 2, 50
-"""Straight pieces of an element at least and at most."""
-
-SLENDER = 2.0
-"""Length of a piece at most, over the least radius of its member: chains then find minima some radii apart."""
+__all__ = ["ALIKE", "ITERATIONS", "Nearby", "Places"]
 
 LEAST = 1e-6
 """Least curvature of half the square of the distance with which Newton's steps are made; it is one across a line."""
 
-ITERATIONS, ARRIVED = 40, 1e-12
+ITERATIONS, ARRIVED = 40, 1e-13
 """Newton's steps at most, and how little of the unit of length is as good as none."""
+
+ALIKE = 1e-9
+"""Share of a distance by which a shorter one is no other: rounding is far below, the curve of a member far above."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +76,10 @@ class Nearby:
     Parameters
     ----------
     lines : Lines
-    closest : Closest
-        It says which members may touch.
+    pairs : iterable of Pair
+        Members that may touch.
+    samples : callable
+        Name of a member -> fractions (n,) of its length between which it is nearly straight.
 
     Attributes
     ----------
@@ -84,9 +88,8 @@ class Nearby:
         What the distance between the centre lines is where the surfaces touch.
     """
 
-    def __init__(self, lines: Lines, closest: Closest) -> None:
-        self.lines, unit = lines, lines.model.scales.length
-        self.pairs = [pair for pair in closest.pairs.values() if pair.stop is None]
+    def __init__(self, lines: Lines, pairs: Iterable[Pair], samples: Callable[[str], Array]) -> None:
+        self.lines, self.pairs, unit = lines, list(pairs), lines.unit
         self.distance = np.array([pair.distance for pair in self.pairs]) / unit
         self._width = SAME * np.array([pair.width for pair in self.pairs]) / unit
         number = {name: k for k, name in enumerate(lines.members)}
@@ -96,12 +99,12 @@ class Nearby:
         for k, (pair, (a, b)) in enumerate(zip(self.pairs, self._members.tolist(), strict=True)):
             table = self._tables.setdefault(pair.contact, np.full((len(number),) * 2, -1, np.intp))
             table[a, b] = table[b, a] = k
-        self._joined = self._joints(closest)
-        self._cut(closest, unit)
+        self._joined = self._joints()
+        self._cut({k: samples(lines.members[k]) for k in np.unique(self._members).tolist()})
 
-    def _joints(self, closest: Closest) -> list[tuple[int, int, int]]:
+    def _joints(self) -> list[tuple[int, int, int]]:
         """Pairs of two members that end at the same node, and which ends these are."""
-        members, found = closest.scene.members, list[tuple[int, int, int]]()
+        members, found = self.lines.scene.members, list[tuple[int, int, int]]()
         for k, pair in enumerate(self.pairs):
             a, b = pair.members
             if a != b:
@@ -109,24 +112,20 @@ class Nearby:
                 found += [(k, i, j) for i, j in ends]
         return found
 
-    def _cut(self, closest: Closest, unit: float) -> None:
+    def _cut(self, samples: dict[int, Array]) -> None:
         """The pieces of all members between which places are searched for, and the stations at ends of elements."""
-        lines, elements, xi, stations = self.lines, list[Index](), list[Array](), list[tuple[int, float]]()
-        taking = set(self._members.ravel().tolist())
-        for k, name in enumerate(lines.members):
+        lines, stations = self.lines, list[Along]()
+        begins, ends = list[Along](), list[Along]()
+        for k, x in samples.items():
+            within = lines.at(k, 0.5 * (x[1:] + x[:-1]))
+            half = 0.5 * np.diff(x) * lines.whole[k]
+            for found, by in ((begins, -half), (ends, half)):
+                # A piece is within one element.
+                xi = np.clip(within.xi + by / lines.length[within.elements], 0.0, 1.0)
+                found.append(Along(within.elements, xi))
             own = np.arange(lines.first[k], lines.first[k + 1])
-            if k not in taking:
-                continue
-            count = np.ceil(lines.length[own] * unit / (SLENDER * closest.least[name]))
-            for e, n in zip(own.tolist(), np.clip(count, PIECES, MOST_PIECES).astype(int).tolist(), strict=True):
-                elements.append(np.repeat(e, n))
-                xi.append(np.arange(n) / n)
-            stations += [(e, 0.0) for e in own.tolist()] + [(int(own[-1]), 1.0)]
-        nothing = np.zeros(0)
-        begin = Along(np.concatenate([nothing, *elements]).astype(np.intp), np.concatenate([nothing, *xi]))
-        each = np.array([1.0 / len(part) for part in xi for _ in part])
-        self._begin, self._end = begin, Along(begin.elements, np.minimum(begin.xi + each, 1.0))
-        self._stations = Along(np.array([e for e, _ in stations], np.intp), np.array([x for _, x in stations]))
+            stations.append(Along(np.append(own, own[-1]), np.append(np.zeros(len(own)), 1.0)))
+        self._begin, self._end, self._stations = (together(part) for part in (begins, ends, stations))
 
     # -- search ---------------------------------------------------------------------------------------
 
@@ -135,8 +134,8 @@ class Nearby:
         from scipy.spatial import cKDTree
 
         if not self.pairs:
-            nowhere = Along(np.zeros(0, np.intp), np.zeros(0))
-            return Places(np.zeros(0, np.intp), nowhere, nowhere, np.zeros(0, np.intp))
+            nowhere = together([])
+            return Places(nowhere.elements, nowhere, nowhere, nowhere.elements)
         p, r = self.lines.positions(curve, self._begin), self.lines.positions(curve, self._end)
         longest = float(np.linalg.norm(r - p, axis=1).max())
         tree = cKDTree(0.5 * (p + r))
@@ -193,6 +192,8 @@ class Nearby:
     def _next_to(self, pairs: Index, one: Along, other: Along) -> Array:
         """As of :class:`.Closest`: whether places are so near to each other along members that they cannot touch."""
         s, t = self.lines.lengths(one), self.lines.lengths(other)
+        swapped = self.lines.owner[one.elements] != self._members[pairs, 0]
+        s, t = np.where(swapped, t, s), np.where(swapped, s, t)
         limit = NEXT_TO * 0.5 * np.pi * self.distance[pairs]
         same = self._members[pairs, 0] == self._members[pairs, 1]
         found = same & (np.abs(s - t) < limit)
@@ -226,7 +227,7 @@ class Nearby:
         lines, one, other = self.lines, places.one, places.other
         held = np.stack([(places.held & 1) > 0, (places.held & 2) > 0])
         for _ in range(steps):
-            slope, curvature, apart = self._half_square(curve, one, other)
+            slope, curvature, apart = self.half_square(curve, one, other)
             # What is held, or at an end of its member, does not move.
             stays = held | np.stack([lines.end(one, -slope[0]), lines.end(other, -slope[1])])
             at = np.where(stays, np.where(slope > 0.0, 0.0, 1.0), 0.5)
@@ -237,7 +238,7 @@ class Nearby:
                 break
         return replace(places, one=one, other=other)
 
-    def _half_square(self, curve: Curve, one: Along, other: Along) -> tuple[Array, Array, Array]:
+    def half_square(self, curve: Curve, one: Along, other: Along) -> tuple[Array, Array, Array]:
         """Slope (2, n), curvature (2, 2, n) of half the square of the distance by both arc lengths; distance (n,)."""
         lines = self.lines
         d = lines.positions(curve, one) - lines.positions(curve, other)
@@ -254,6 +255,37 @@ class Nearby:
         return slope, curvature, np.maximum(np.linalg.norm(d, axis=1), TINY)
 
     # -- ends of elements -----------------------------------------------------------------------------
+
+    def beside(self, curve: Curve, pair: Pair, at: Array, limit: float) -> tuple[Array, Places]:
+        """Of places at fractions ``at`` (n,) of the first member of a pair those (k,) near to which the second one is,
+        and both places (k,): whose distance is below a ``limit``, or little more.  The pair may be in the other order.
+
+        Of a member beside itself each place counts with those that come later on it.
+        """
+        lines = self.lines
+        a, b = (lines.members.index(name) for name in pair.members)
+        pieces = np.flatnonzero(lines.owner[self._begin.elements] == b)
+        begin, end, mine = self._begin.chosen(pieces), self._end.chosen(pieces), lines.at(a, at)
+        p, r, here = (lines.positions(curve, along) for along in (begin, end, mine))
+        out, chords = here[:, None, :] - p, r - p
+        share = np.clip(np.einsum("npi,pi->np", out, chords) / np.einsum("pi,pi->p", chords, chords), 0.0, 1.0)
+        distances = np.linalg.norm(out - share[:, :, None] * chords, axis=2)
+        if a == b:
+            far = lines.lengths(begin) + share * (end.xi - begin.xi) * lines.length[begin.elements]
+            near = (
+                far - lines.lengths(mine)[:, None]
+                < NEXT_TO * 0.5 * np.pi * self.distance[self._tables[pair.contact][a, b]]
+            )
+            distances = np.where(near, np.inf, distances)
+        best, longest = np.argmin(distances, axis=1), float(np.linalg.norm(chords, axis=1).max())
+        chosen = np.flatnonzero(distances[np.arange(len(at)), best] < limit + 0.5 * longest)
+        best, share = best[chosen], share[chosen, best[chosen]]
+        there = Along(begin.elements[best], begin.xi[best] + share * (end.xi - begin.xi)[best])
+        number = np.full(len(chosen), self._tables[pair.contact][a, b])
+        held = np.ones(len(chosen), np.intp)
+        found = self.nearest(curve, Places(number, mine.chosen(chosen), there, held), ITERATIONS, longest)
+        apart = self.apart(found)
+        return chosen[apart], found.chosen(apart)
 
     def _beside(
         self, curve: Curve, tree: object, p: Array, r: Array, reach: float, limit: float, longest: float
@@ -296,3 +328,65 @@ class Nearby:
             whole = whole.with_more(more)
         whole = self.nearest(curve, whole, ITERATIONS, longest)
         return whole.chosen(self.apart(whole))
+
+
+def together(parts: Iterable[Along]) -> Along:
+    """Places of several lists, one after the other."""
+    parts = list(parts)
+    elements = np.concatenate([np.zeros(0, np.intp), *(part.elements for part in parts)])
+    return Along(elements, np.concatenate([np.zeros(0), *(part.xi for part in parts)]))
+
+
+def downhill(slope: Array, curvature: Array, at: Array) -> Array:
+    """Steps (2, n) in both arc lengths, m, towards the minimum; none beyond an end of a member.
+
+    Downhill also where the distance is curved the other way, or not at all: of the curvatures the sizes are taken.
+    """
+    free = ~(((at <= 0.0) & (slope > 0.0)) | ((at >= 1.0) & (slope < 0.0)))
+    both = free.all(axis=0)
+    mean, half = 0.5 * (curvature[0, 0] + curvature[1, 1]), 0.5 * (curvature[0, 0] - curvature[1, 1])
+    across = np.where(both, curvature[0, 1], 0.0)
+    root = np.hypot(half, across)
+    sizes = np.maximum(np.abs([mean + root, mean - root]), LEAST)
+    angle = 0.5 * np.arctan2(across, half)
+    c, s = np.cos(angle), np.sin(angle)
+    first, second = (c * slope[0] + s * slope[1]) / sizes[0], (c * slope[1] - s * slope[0]) / sizes[1]
+    together = -np.array([c * first - s * second, s * first + c * second])
+    alone = -slope / np.maximum(np.abs([curvature[0, 0], curvature[1, 1]]), LEAST)
+    return np.where(both, together, np.where(free, alone, 0.0))
+
+
+def locally_least(i: Index, j: Index, distances: Array, columns: int) -> Array:
+    """Of pairs of pieces those that are not farther apart than any pair beside them; of equal ones the first."""
+    width = columns + 2
+    keys = (i + 1) * width + j + 1
+    order = np.argsort(keys)
+    ordered, values = keys[order], distances[order]
+    least = np.ones(len(keys), bool)
+    for di in (-1, 0, 1):
+        for dj in (-1, 0, 1):
+            if di or dj:
+                wanted = keys + di * width + dj
+                place = np.clip(np.searchsorted(ordered, wanted), 0, len(ordered) - 1)
+                beside = np.where(ordered[place] == wanted, values[place], np.inf)
+                # Where members are parallel, rounding shall not make a minimum of each piece.
+                earlier = di < 0 or (di == 0 and dj < 0)
+                least &= distances < beside * (1.0 - ALIKE) if earlier else distances <= beside * (1.0 + ALIKE)
+    return least
+
+
+def closest_on_pieces(p: Array, p_end: Array, r: Array, r_end: Array) -> tuple[Array, Array, Array]:
+    """Where straight pieces (n, 3) are nearest to each other, fractions (n,) of both, and the distance (n,).
+
+    Source: Ericson 2005, Real-Time Collision Detection, section 5.1.9.
+    """
+    d1, d2, w = p_end - p, r_end - r, p - r
+    a, e = np.einsum("ni,ni->n", d1, d1), np.einsum("ni,ni->n", d2, d2)
+    b, c, f = np.einsum("ni,ni->n", d1, d2), np.einsum("ni,ni->n", d1, w), np.einsum("ni,ni->n", d2, w)
+    det = a * e - b * b
+    # Pieces in one direction are nearest all along: their middles stand for them.
+    parallel = det <= 1e-12 * a * e
+    s = np.where(parallel, 0.5, np.clip((b * f - c * e) / np.where(parallel, 1.0, det), 0.0, 1.0))
+    t = np.clip((b * s + f) / np.maximum(e, TINY), 0.0, 1.0)
+    s = np.clip((b * t - c) / np.maximum(a, TINY), 0.0, 1.0)
+    return s, t, np.linalg.norm(w + s[:, None] * d1 - t[:, None] * d2, axis=1)

@@ -25,9 +25,9 @@ from ..solvers.newton import Balance, Iterate, Limits, correct
 from ..solvers.one_sided import OneSided
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
-from .closest import Pair
 from .lines import Points, begun, points_of
 from .member_contact import MemberContact, Way
+from .pairs import Pair
 
 __all__ = ["StoppedEnds", "brought_in", "stops_ends"]
 

@@ -19,7 +19,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..contact.closest import Closest, Near, Pair
+from ..contact.closest import Closest
+from ..contact.pairs import Near, Pair
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import TINY, Array, Index
 from ..mechanics.clearances import PARALLEL, Rows

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ..contact.closest import Closest
-from ..contact.nearby import Nearby, Places
+from ..contact.nearby import Places
 from ..description.contacts import contact_radius
 from ..description.obstacles import Obstacle
 from ..mathematics import quaternion
@@ -127,8 +127,8 @@ class Touching:
     def __init__(self, system: StageEquations) -> None:
         model = system.model
         scene, self.unit, self.axes = model.scene, model.scales.length, model.element.axes
-        self.lines = Lines(system.tables)
-        self.nearby = Nearby(self.lines, Closest(scene))
+        self.nearby = Closest(scene).nearby(model, system.tables)
+        self.lines = self.nearby.lines
         self.spots = spots_of(scene, model.mesh)
         self.distance = float(self.nearby.distance.min(initial=np.inf))
         contacts = [scene.contacts[pair.contact] for pair in self.nearby.pairs]

@@ -17,9 +17,9 @@ from functools import partial
 
 import numpy as np
 
-from ..contact.closest import PairKey
 from ..contact.lines import points_of
 from ..contact.member_contact import MemberContact, Way
+from ..contact.pairs import PairKey
 from ..contact.stopped_ends import StoppedEnds, brought_in, stops_ends
 from ..description.records import counted
 from ..errors import SceneError, SolveError

@@ -14,6 +14,8 @@ import numpy as np
 
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index, Sparse
+from .fields import Fields
+from .model import Model
 from .segments import place_of_cut
 from .tables import Tables
 
@@ -64,7 +66,8 @@ class Lines:
 
     Parameters
     ----------
-    tables : Tables
+    model : Model
+    tables : Tables, optional
         They number the unknowns.
 
     Attributes
@@ -74,21 +77,33 @@ class Lines:
         Number of the first element of each member, then that of all elements; a rigid member is one element.
     owner : ndarray (elements,)
         Number of the member of each element.
-    length : ndarray (elements,)
-        Lengths of the elements in the undeformed scene.
+    length, whole : ndarray (elements,), (members,)
+        Lengths of the elements and of the members in the undeformed scene.
+    scene : Scene
+    unit : float
+        The unit of length, m.
+    axes : int
     """
 
-    def __init__(self, tables: Tables) -> None:
-        self.tables, model = tables, tables.model
-        self.model, self.axes = model, model.element.axes
+    def __init__(self, model: Model, tables: Tables | None = None) -> None:
+        # Not the model: what is kept for it shall not keep it.
+        self.scene, self.unit, self.axes, self._space = (
+            model.scene,
+            model.scales.length,
+            model.element.axes,
+            model.space,
+        )
+        if tables is not None:
+            self.tables = tables
+        self._moving = tables is not None
         scene, mesh, points = model.scene, model.mesh, len(model.element.points)
         self.members = tuple(name for name in model.members if scene.members[name].type != "small")
         unit, counts = model.scales.length, list[int]()
-        turns, tangents, places, starts, ends = [], [], [], [], []
+        turns, tangents, places, starts, ends, numbers = [], [], [], [], [], []
         for name in self.members:
             cuts, first, line = mesh.cuts[name], model.beams.first[name], scene.center_lines[name]
             own = np.arange(first, first + len(cuts) - 1)
-            if scene.members[name].type == "rigid":
+            if self._is_chord(name):
                 begin, end = line.positions(np.array([0.0, 1.0]))[:, : self.axes] / unit
                 own, cuts = own[:1], np.array([0.0, 1.0])
                 turns.append(np.repeat(model.rotations.turns[own, :1], points, axis=1))
@@ -97,18 +112,24 @@ class Lines:
                 turns.append(model.rotations.turns[own])
                 tangents.append(model.beams.tangent[own])
             counts.append(len(own))
+            numbers.append(own)
             at = line.positions(cuts)[:, : self.axes] / unit
             starts.append(at[:-1])
             ends.append(np.diff(cuts) * line.length / unit)
-            names = (place_of_cut(mesh, model.segments.ends, name, cut) for cut in range(len(own)))
-            places.append([model.segments.place(place) for place in names])
+            if tables is not None:
+                names = (place_of_cut(mesh, model.segments.ends, name, cut) for cut in range(len(own)))
+                places += [model.segments.place(place) for place in names]
         self.first = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
         self.owner = np.repeat(np.arange(len(counts)), counts)
         self._turns, self._tangents = np.concatenate(turns), np.concatenate(tangents)
-        self._places, self._starts = np.concatenate(places).astype(np.intp), np.concatenate(starts)
+        self._places, self._starts = np.array(places, np.intp), np.concatenate(starts)
         self.length = np.concatenate(ends)
+        self._numbers = np.concatenate(numbers)
+        # A rigid member is a multiple of the first of its elements.
+        self._whole = self.length / model.beams.weight[self._numbers].sum(axis=1)
         # Along each member lengths go on from those of the ones before.
         self._far = np.concatenate([[0.0], np.cumsum(self.length)])
+        self.whole = np.diff(self._far[self.first])
         # Weights are polynomials of what goes from -1 to 1.
         powers = np.vander(2.0 * model.element.points - 1.0, increasing=True)
         self._lagrange = np.linalg.inv(powers)
@@ -117,35 +138,43 @@ class Lines:
 
     def _bend(self) -> None:
         """What the polynomials of members that are curved in the undeformed scene miss of their centre lines."""
-        scene = self.model.scene
-        self._curved = np.array(
-            [scene.members[m].type != "rigid" and scene.center_lines[m].turning > 0.0 for m in self.members], bool
-        )
+        turning = (self.scene.center_lines[name].turning for name in self.members)
+        curved = (turns > 0.0 and not self._is_chord(name) for turns, name in zip(turning, self.members, strict=True))
+        self._curved = np.array(list(curved), bool)
+
+    def _is_chord(self, name: str) -> bool:
+        """Whether a member is rigid and one element, straight between its nodes."""
+        scene = self.scene
+        return scene.members[name].type == "rigid" and (self._moving or scene.center_lines[name].turning == 0.0)
 
     # -- states ---------------------------------------------------------------------------------------
 
     def curve(self, q: Array, places: Array) -> Curve:
         """The lines for rotations (rotations, components) and displacements (places, axes) of all places."""
         turned = q[self._turns]
-        if self.model.space:
+        if self._space:
             turned = turned / np.linalg.norm(turned, axis=-1, keepdims=True)
         return Curve(self._starts + places[self._places], quaternion.turned_by(turned, self._tangents))
 
+    def of(self, fields: Fields) -> Curve:
+        """The lines in a state, whose members may also stretch."""
+        tangents = fields.turned[self._numbers] * self._whole[:, None, None]
+        counts = zip(self.members, np.diff(self.first).tolist(), strict=True)
+        starts = np.concatenate([fields.element_starts(name)[:count] for name, count in counts])
+        return Curve(self._starts + starts, tangents)
+
     # -- places ---------------------------------------------------------------------------------------
 
-    def at(self, member: int, x: float) -> tuple[int, float]:
-        """Number of the element, and fraction of it, at a fraction of the length of a member."""
-        first, last = self.first[member], self.first[member + 1]
-        far = self._far[first] + x * (self._far[last] - self._far[first])
-        e = int(np.clip(np.searchsorted(self._far, far, side="right") - 1, first, last - 1))
-        return e, float(np.clip((far - self._far[e]) / self.length[e], 0.0, 1.0))
+    def at(self, member: int, x: Array) -> Along:
+        """Places at fractions (n,) of the length of a member, by its number."""
+        return self.moved(Along(np.full(len(x), self.first[member]), np.zeros(len(x))), x * self.whole[member])
 
     def fractions(self, along: Along) -> Array:
         """Fractions (n,) of the lengths of the members."""
         far = self._far[along.elements] + along.xi * self.length[along.elements]
         owner = self.owner[along.elements]
         begin, end = self._far[self.first[owner]], self._far[self.first[owner + 1]]
-        return np.asarray(np.clip((far - begin) / (end - begin), 0.0, 1.0))
+        return np.where(self.end(along, np.ones(len(along))), 1.0, np.clip((far - begin) / (end - begin), 0.0, 1.0))
 
     def lengths(self, along: Along) -> Array:
         """Arc lengths (n,) from the begins of the members."""
@@ -159,7 +188,8 @@ class Lines:
         far = np.clip(self._far[along.elements] + along.xi * self.length[along.elements] + by, begin, end)
         inside = np.searchsorted(self._far, far, side="right") - 1
         e = np.clip(inside, self.first[owner], self.first[owner + 1] - 1)
-        return Along(e, np.clip((far - self._far[e]) / self.length[e], 0.0, 1.0))
+        # Rounding leaves nothing of the way to an end.
+        return Along(e, np.where(far == end, 1.0, np.clip((far - self._far[e]) / self.length[e], 0.0, 1.0)))
 
     def end(self, along: Along, by: Array) -> Array:
         """Whether places (n,) are at the end of their member to which ``by`` (n,) points, of bool."""
@@ -176,7 +206,8 @@ class Lines:
 
     def slopes(self, curve: Curve, along: Along) -> Array:
         """Derivatives (n, axes) of positions by the arc length."""
-        return self._derivative(curve, along, self._powers(along))
+        found = self._derivative(curve, along, self._powers(along))
+        return found if not self._curved.any() else found + self._missed(along, slope=True)
 
     def bends(self, curve: Curve, along: Along) -> Array:
         """Second derivatives (n, axes) of positions by the arc length."""
@@ -200,17 +231,21 @@ class Lines:
         powers = np.stack([(t ** (k + 1) - (-1.0) ** (k + 1)) / (2.0 * (k + 1)) for k in range(count)], axis=1)
         return np.asarray(powers @ self._weights)
 
-    def _missed(self, along: Along) -> Array:
-        """Centre lines of the undeformed scene less the polynomials, (n, axes)."""
-        found, owner, unit = np.zeros((len(along), self.axes)), self.owner[along.elements], self.model.scales.length
+    def _missed(self, along: Along, *, slope: bool = False) -> Array:
+        """Centre lines of the undeformed scene, or their slopes, less those of the polynomials, (n, axes)."""
+        found, owner = np.zeros((len(along), self.axes)), self.owner[along.elements]
         for k in np.flatnonzero(self._curved).tolist():
             here = np.flatnonzero(owner == k)
             if not len(here):
                 continue
-            own, line = along.chosen(here), self.model.scene.center_lines[self.members[k]]
-            points = line.positions(self.fractions(own))[:, : self.axes] / unit
-            chords = np.einsum("np,npa->na", self._reach(own), self._tangents[own.elements])
-            found[here] = points - self._starts[own.elements] - chords
+            own, line = along.chosen(here), self.scene.center_lines[self.members[k]]
+            tangents, x = self._tangents[own.elements], self.fractions(own)
+            if slope:
+                within = np.einsum("np,npa->na", self._powers(own) @ self._weights, tangents)
+                found[here] = line.tangents(x)[:, : self.axes] - within / self.length[own.elements][:, None]
+            else:
+                within = self._starts[own.elements] + np.einsum("np,npa->na", self._reach(own), tangents)
+                found[here] = line.positions(x)[:, : self.axes] / self.unit - within
         return found
 
     # -- forces ---------------------------------------------------------------------------------------
@@ -251,7 +286,7 @@ class Lines:
             return np.asarray(found)
         half = 0.5 * gain
         along_it = half * np.einsum("npa,npa->np", half, found)[..., None]
-        return np.asarray(found + along_it + (np.cross(half, found) if self.model.space else 0.0))
+        return np.asarray(found + along_it + (np.cross(half, found) if self._space else 0.0))
 
     def turned(self, before: Array, after: Array, along: Along) -> Array:
         """Rodrigues vectors (n, points, turns) by which points turn between rotations (rotations, components)."""

@@ -646,7 +646,7 @@ class Fields:
         model = self.model
         part = model.elements_of(member)
         gained = self.turned[part] - model.beams.tangent[part]
-        moved = _three(_summed(self._stations(member, x), self._element_starts(member), gained))
+        moved = _three(_summed(self._stations(member, x), self.element_starts(member), gained))
         return model.scene.center_lines[member].positions(x) + moved * model.scales.length
 
     def rates(self, member: str, x: Array, spin: Array, known: Array) -> tuple[Array, Array]:
@@ -882,7 +882,7 @@ class Fields:
         return gained
 
     @kept(MEMBERS)
-    def _element_starts(self, member: str) -> Array:
+    def element_starts(self, member: str) -> Array:
         """Displacement at the start of each element of a member (and its end)."""
         model = self.model
         part = model.elements_of(member)

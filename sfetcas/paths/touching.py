@@ -17,9 +17,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..contact.closest import ONE, Near
 from ..contact.lines import LINE, lies_along, points_in, points_of
 from ..contact.member_contact import MemberContact
+from ..contact.pairs import ONE, Near
 from ..description.records import enumerated
 from ..description.scene import Scene
 from ..equilibria.member_contact_steps import undeformed
@@ -603,6 +603,7 @@ class Touching(Conditions[_At]):
 
 SAME_END = 1e-9
 """Fractions of a length by which a place is off the end at which it is: they are compared to nine digits."""
+
 
 def _side(members: tuple[str, ...], one: _End) -> int:
     """Which of the members of a point is that of a condition, or took its place: pairs have an order."""
