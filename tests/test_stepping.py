@@ -497,7 +497,7 @@ def _curve(lines, equations, state):
 @pytest.mark.parametrize("dimension", ["plane", "space"])
 def test_lines_have_the_derivatives_of_their_positions(dimension):
     equations, state = _near(dimension)
-    lines, rng = Lines(equations.model, equations.tables), np.random.default_rng(0)
+    lines, rng = Lines(equations.model, equations.model.members, equations.tables), np.random.default_rng(0)
     change = np.concatenate([0.3 * rng.normal(size=equations.unknowns), np.zeros(equations.rows)])
     state = equations.moved(state, change)
     along = Along(np.arange(len(lines.owner)), rng.uniform(size=len(lines.owner)))

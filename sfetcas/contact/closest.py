@@ -19,7 +19,7 @@ from ..description.obstacles import edge_side, members_of, takes_part
 from ..description.scene import Scene
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.balance import three
-from ..mechanics.center_lines import Curve, Lines
+from ..mechanics.center_lines import Along, Curve, Lines
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Mesh
 from ..mechanics.model import Model
@@ -114,6 +114,7 @@ class Closest:
     def draw_back(self, by: float) -> None:
         """Draw back the surfaces of all obstacles and members from where they are by a length, m."""
         self.pairs = {key: pair.drawn_back(by) for key, pair in self._given.items()} if by else self._given
+        self._nearby.clear()
 
     def back(self, point: ContactPoint) -> float:
         """How far the surfaces of a point are drawn back, m, from where the model has them."""
@@ -156,16 +157,23 @@ class Closest:
             def samples(member: str) -> Array:
                 return self.samples(model.mesh, member, coarse)
 
-            self._nearby[model] = Nearby(Lines(model, tables), self._between, samples)
-        nearby = self._nearby[model]
-        nearby.distance[:] = [self.pairs[pair.key].distance / model.scales.length for pair in self._between]
-        return nearby
+            # In a motion all that moves counts.
+            all_names = [name for name, member in self.scene.members.items() if member.type != "small"]
+            names = self.members if tables is None else all_names
+            between = (pair for pair in self.pairs.values() if pair.stop is None)
+            self._nearby[model] = Nearby(Lines(model, names, tables), between, samples)
+        return self._nearby[model]
 
     def _curve(self, fields: Fields) -> Curve:
         """The centre lines in a state."""
         if fields not in self._curves:
             self._curves[fields] = self.nearby(fields.model).lines.of(fields)
         return self._curves[fields]
+
+    def _on_line(self, fields: Fields, member: str, x: Array) -> tuple[Lines, Curve, Along]:
+        """The centre lines, their state, and places at fractions (n,) of the length of a member."""
+        lines = self.nearby(fields.model).lines
+        return lines, self._curve(fields), lines.at(lines.members.index(member), x)
 
     def _told(self, nearby: Nearby, curve: Curve, places: Places) -> list[Near]:
         """Places on two members, the nearest of each pair first."""
@@ -256,7 +264,8 @@ class Closest:
         known = self._courses.setdefault(fields, {})
         if member not in known:
             x = self.samples(fields.model.mesh, member)
-            known[member] = x, fields.positions(member, x), fields.slopes(member, x)
+            lines, curve, at = self._on_line(fields, member, x)
+            known[member] = x, lines.unit * three(lines.positions(curve, at)), three(lines.slopes(curve, at))
         return known[member]
 
     def _passes(self, fields: Fields, pair: Pair) -> tuple[Array, Array, Array]:
@@ -288,7 +297,7 @@ class Closest:
         """Places (n,) of the minima between others."""
         (member,) = pair.members
         for _ in range(ITERATIONS):
-            slope, curvature = self._slopes(fields, pair, at)
+            slope, curvature = self._slopes(fields, pair, at, near=True)
             low, high = np.where(slope < 0.0, at, low), np.where(slope > 0.0, at, high)
             after = at - slope / (np.maximum(np.abs(curvature), TINY) * self.lengths[member])
             outside = ((after <= low) & (low > 0.0)) | ((after >= high) & (high < 1.0))
@@ -325,22 +334,29 @@ class Closest:
         """Of places (n,) of the member gaps (n,), m, and normals (n, 3); at an edge for the side 1."""
         (member,), stop = pair.members, pair.stop
         assert stop is not None
-        places = fields.positions(member, x)
+        lines, curve, at = self._on_line(fields, member, x)
+        places = lines.unit * three(lines.positions(curve, at))
         # Only across an edge the normal depends on the member.
-        tangent = fields.slopes(member, x) if stop.kind == "sharp" else places
+        tangent = three(lines.slopes(curve, at)) if stop.kind == "sharp" else places
         places, tangent = fields.seen(pair.contact, places, tangent)
         normals = stop.normals(places, tangent)
         return np.einsum("ni,ni->n", (places - stop.place) @ stop.across, normals) - pair.distance, normals
 
-    def _slopes(self, fields: Fields, pair: Pair, x: Array) -> tuple[Array, Array]:
+    def _slopes(self, fields: Fields, pair: Pair, x: Array, *, near: bool = False) -> tuple[Array, Array]:
         """Of places (n,) of the member slopes (n,) and curvatures (n,), 1/m, of the gap by arc length.
 
-        At an edge, which members may be at, slopes, m, and curvatures of half the square of the distance.
+        At an edge, which members may be at, slopes, m, and curvatures of half the square of the distance.  Where it is
+        ``near`` enough for Newton's method, curvatures are those of the line, not of the rotations along it.
         """
         (member,), stop = pair.members, pair.stop
         assert stop is not None
-        places, tangent = fields.seen(pair.contact, fields.positions(member, x), fields.slopes(member, x))
-        _, bent = fields.seen(pair.contact, places, self._curvature(fields, member, x))
+        lines, curve, at = self._on_line(fields, member, x)
+        bent = three(lines.bends(curve, at)) / lines.unit if near else self._curvature(fields, member, x)
+        places, tangent = lines.unit * three(lines.positions(curve, at)), three(lines.slopes(curve, at))
+        places, tangent, bent = (
+            *fields.seen(pair.contact, places, tangent),
+            fields.seen(pair.contact, places, bent)[1],
+        )
         out = (places - stop.place) @ stop.across
         towards = out if pair.edge else stop.normals(places, tangent)
         slope, curvature = np.einsum("ni,ni->n", towards, tangent), np.einsum("ni,ni->n", towards, bent)

@@ -8,6 +8,7 @@ of :mod:`~sfetcas.dynamics.conserving` are.  Everything is dimensionless, in two
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,6 +68,8 @@ class Lines:
     Parameters
     ----------
     model : Model
+    names : collection of str
+        Its members that count.
     tables : Tables, optional
         They number the unknowns.
 
@@ -85,7 +88,7 @@ class Lines:
     axes : int
     """
 
-    def __init__(self, model: Model, tables: Tables | None = None) -> None:
+    def __init__(self, model: Model, names: Collection[str], tables: Tables | None = None) -> None:
         # Not the model: what is kept for it shall not keep it.
         self.scene, self.unit, self.axes, self._space = (
             model.scene,
@@ -97,7 +100,7 @@ class Lines:
             self.tables = tables
         self._moving = tables is not None
         scene, mesh, points = model.scene, model.mesh, len(model.element.points)
-        self.members = tuple(name for name in model.members if scene.members[name].type != "small")
+        self.members = tuple(name for name in model.members if name in names)
         unit, counts = model.scales.length, list[int]()
         turns, tangents, places, starts, ends, numbers = [], [], [], [], [], []
         for name in self.members:
@@ -117,8 +120,8 @@ class Lines:
             starts.append(at[:-1])
             ends.append(np.diff(cuts) * line.length / unit)
             if tables is not None:
-                names = (place_of_cut(mesh, model.segments.ends, name, cut) for cut in range(len(own)))
-                places += [model.segments.place(place) for place in names]
+                cut_at = (place_of_cut(mesh, model.segments.ends, name, cut) for cut in range(len(own)))
+                places += [model.segments.place(place) for place in cut_at]
         self.first = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
         self.owner = np.repeat(np.arange(len(counts)), counts)
         self._turns, self._tangents = np.concatenate(turns), np.concatenate(tangents)

@@ -155,7 +155,7 @@ def beside_line(mesh: Mesh, point: ContactPoint) -> list[tuple[int, bool, float]
     cut, cuts = standing(mesh, point, 0), mesh.cuts[point.members[0]]
     assert cut is not None
     elements = [i for i, taken in zip((cut - 1, cut), point.sides, strict=True) if taken and 0 <= i < len(cuts) - 1]
-    lengths = [float(cuts[i + 1] - cuts[i]) for i in elements]
+    lengths = [cuts[i + 1] - cuts[i] for i in elements]
     return [(i, i < cut, length / sum(lengths)) for i, length in zip(elements, lengths, strict=True)]
 
 
