@@ -40,6 +40,11 @@ BESIDE, LOCATED = 2, 8.0
 than so many times the accuracy: an eighth of it is the rotation by a force that is off by half an element.
 """
 
+FLAT = 1e-3
+"""Gap between places where members touch each other, over the sum of the radii, up to which three of these are seen as
+one line where they cannot slide: what members may penetrate each other by, too.
+"""
+
 LIFTED = 3e-6
 """Gap, over the size, from which on a line does not reach the end of a member, or is interrupted: on coarse elements
 pressure may vanish somewhere within.
@@ -260,8 +265,11 @@ class Lines:
     # -- from points to lines and back ------------------------------------------------------------
 
     def lengthened(self, found: Solved, least: int = LINE) -> tuple[Mesh, Points] | None:
-        """Mesh and points where a pair that touches at so many places is a line from now on; None for none."""
-        points, mesh = points_of(found), replace(found.model.mesh, points=())
+        """Mesh and points where a pair that touches at so many places is a line from now on; None for none.
+
+        Of members that touch each other it is three, and only with ``SHORT_LINE``, where they cannot slide.
+        """
+        points = points_of(found)
         for key, pair in self.closest.pairs.items():
             own = [p for p in points if p.pair == key and beside_ends(p)]
             if not own or pair.edge or not self.bends(pair.members[0]):
@@ -269,19 +277,39 @@ class Lines:
             places = [point.at[0] for point in own]
             # What touches at a node touches with all members there.
             places += [x for x in self._shared(pair, points) if x not in places]
-            needed = least if pair.stop is not None else LINE
+            needed = least if pair.stop is not None else LINE if least < LINE else np.inf
             known = key in self.keys
             # Points that have slid to where others are, or begin there, make no line.
             apart = np.diff(np.sort(places)) * self.closest.lengths[pair.members[0]] >= ONE * SAME * pair.width
             if (self.chosen(key) or not any(map(slides, own))) if known else 1 + apart.sum() < needed:
                 continue
-            self.keys |= {key}
-            longest = self._longest(pair, places)
-            low, high = min(places) - longest, max(places) + longest
-            mesh = self.divided(mesh, pair, places)
-            near = self.closest.along(found.fields, pair, mesh, 0.1 * pair.width)
-            others = tuple(point for point in points if point not in own)
-            return mesh, (*others, *self.laid(one for one in near if low <= one.at[0] <= high))
+            return self._as_line(found, found.model.mesh, pair, places)
+        return None
+
+    def _as_line(self, found: Solved, mesh: Mesh, pair: Pair, places: Sequence[float]) -> tuple[Mesh, Points]:
+        """A mesh and points where a pair that touches at some places is a line from now on."""
+        self.keys |= {pair.key}
+        longest = self._longest(pair, places)
+        low, high = min(places) - longest, max(places) + longest
+        mesh = self.divided(replace(mesh, points=()), pair, places)
+        near = self.closest.along(found.fields, pair, mesh, 0.1 * pair.width)
+        others = tuple(point for point in points_of(found) if point.pair != pair.key or not beside_ends(point))
+        return mesh, (*others, *self.laid(one for one in near if low <= one.at[0] <= high))
+
+    def parallel(self, found: Solved, mesh: Mesh) -> tuple[Mesh, Points] | None:
+        """The mesh and points where members that touch each other at three places or more, and are as near between
+        them, are a line from now on; None for none.
+        """
+        for key, pair in self.closest.pairs.items():
+            own = [p for p in points_of(found) if p.pair == key and beside_ends(p)]
+            if pair.stop is not None or key in self.keys or len(own) < LINE or not self.bends(pair.members[0]):
+                continue
+            places = np.sort([point.at[0] for point in own])
+            middles = 0.5 * (places[1:] + places[:-1])
+            near = {one.at[0] for one in self.closest.beside(found.fields, pair, middles, FLAT * pair.distance)}
+            flat = np.isin(middles, list(near))
+            if (flat[1:] & flat[:-1]).any():
+                return self._as_line(found, mesh, pair, places.tolist())
         return None
 
     def _shared(self, pair: Pair, points: Points) -> list[float]:

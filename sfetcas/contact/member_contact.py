@@ -507,7 +507,8 @@ class MemberContact:
         """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found.
 
         Where it is known where lines end these places go on sliding; where that leads nowhere, or is not known, forces
-        at ends of elements show where they end, and these slide from there.
+        at ends of elements show where they end, and these slide from there.  Members touch each other at places that slide;
+        where these lead nowhere, and the members are as near between them, along a line.
         """
         lines, found = self.lines.keys, None
         known = self.lines.ends_slide(points)
@@ -528,6 +529,9 @@ class MemberContact:
         if found is None:
             # What was taken for a line on the way to nothing is none.
             self.lines.keys = lines
+            lined = self.lines.parallel(source, mesh)
+            found = None if lined is None else self._resolved(*lined, source, way, drag, False)
+            self.lines.keys = lines if found is None else self.lines.keys
         return found
 
     def _resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float, ends: bool) -> Solved | None:
@@ -544,7 +548,7 @@ class MemberContact:
                     # All at once is faster; where that leads nowhere, one after the other.
                     careful, found = True, source
                 elif solved and least > SHORT_LINE:
-                    # Places between which a member is flat may slide anywhere there.
+                    # Places between which a member is flat, or members are parallel, may slide anywhere there.
                     least, found = SHORT_LINE, source
                 else:
                     return None
