@@ -507,8 +507,8 @@ class MemberContact:
         """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found.
 
         Where it is known where lines end these places go on sliding; where that leads nowhere, or is not known, forces
-        at ends of elements show where they end, and these slide from there.  Members touch each other at places that slide;
-        where these lead nowhere, and the members are as near between them, along a line.
+        at ends of elements show where they end, and these slide from there.  Members touch each other at places that
+        slide; where these lead nowhere, and the members are as near between them, along a line.
         """
         lines, found = self.lines.keys, None
         known = self.lines.ends_slide(points)
