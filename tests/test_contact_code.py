@@ -9,6 +9,7 @@ import pytest
 from scenes import CARRIED
 from test_codegen import built, needs_compiler, said
 from test_contact_design import DRUM, FLOOR, pressed, two
+from test_member_contact import leaves
 
 from sfetcas import Scene, SceneError, export, solve
 from sfetcas.parametric.equilibrium import equilibrium_solver
@@ -87,6 +88,47 @@ def test_carried_obstacle_that_touches():
         if outcome.code is Code.SOLVED:
             # Places are within elements of the mesh of the first load.
             assert solver.by_name(results)["nodes.B.position"] == pytest.approx(step.position("B"), abs=1e-7)
+
+
+def test_members_that_touch_each_other_are_looked_at_too():
+    """One cantilever comes to rest on another one, which is beside it all along."""
+    scene = leaves(accuracy=1e-6)
+    solver, near = solver_of(scene, arguments=["loads.tip.value.1"]), None
+    for load in (-0.03, -0.6, -3.0, -6.0):
+        outcome, results = solver.solve(np.array([load]), near)
+        step = solve(scene.replace({"loads.tip.value.1": load})).last
+        touches = step.contacts["pair"]["at"] is not None
+        assert outcome.code is (Code.SOLVED if touches else Code.TOUCHES)
+        if touches:
+            near = outcome.state
+            # Places are within elements of the mesh of the default load.
+            np.testing.assert_allclose(solver.by_name(results)["nodes.a1.position"], step.position("a1"), atol=1e-6)
+
+
+def test_members_that_cross_are_seen_as_near_as_they_are():
+    """A cantilever over a rigid bar that crosses it, between the places that are looked at on both: at 0.613 and 0.29."""
+    table = {
+        "dimension": "space",
+        "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0, 0], "support": "clamped"},
+            "B": {"position": [1, 0, 0]},
+            "C": {"position": [0.613 - 0.4 * 0.29, -0.05, -0.29], "support": "clamped"},
+            "D": {"position": [0.613 + 0.4 * 0.71, -0.05, 0.71]},
+        },
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}, "r": {"nodes": ["C", "D"], "type": "rigid"}},
+        "loads": {"F": {"type": "force", "node": "B", "value": [0, -0.1, 0]}},
+        "contacts": {"c": {"type": "members", "members": ["m", "r"], "radius": 0.01}},
+        "analysis": {"accuracy": 1e-7},
+    }
+    scene = Scene.from_dict(table)
+    solver = solver_of(scene, arguments=["loads.F.value.1"])
+    # As the cantilever bends in proportion to the load the gap of 0.03 is closed at -0.2004.
+    gap = solve(scene.replace({"loads.F.value.1": -0.195})).last.contacts["c"]["gap"]
+    load = -0.195 * 0.03 / (0.03 - gap)
+    # A parabola of places a 64th apart is off by less than 1e-4 of the gap that there was.
+    codes = [solver.solve(np.array([share * load]))[0].code for share in (0.997, 1.003)]
+    assert codes == [Code.SOLVED, Code.TOUCHES]
 
 
 @needs_compiler

@@ -1,20 +1,23 @@
 """What is looked at where what touches is not found anew, as in generated code: whether the same touches.
 
 Margins, dimensionless, are below zero where something else touches: how hard each place pushes, how far it is from the
-ends of its member, and gaps of members from obstacles at places along them.  Between three of these the least gap is
-that of a parabola.  Near a place that touches there is no other margin.
+ends of its members, and gaps of places along members, from obstacles and from each other.  Between these the least gap
+is that of a parabola.  Near a place that touches there is no other margin.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import casadi as ca
 import numpy as np
 
+from ..contact.closest import Closest
+from ..contact.nearby import Nearby, Places
 from ..description.answers import answer_name
 from ..description.obstacles import members_of
 from ..errors import SceneError
+from ..mathematics.arrays import Array
 from ..mechanics.model import Model
 from ..mechanics.singles import turned_vector
 from .arguments import Argument, Arguments
@@ -61,6 +64,7 @@ def margins_of(name: str, base: Model, arguments: Sequence[Argument]) -> ca.Func
         (contact, member): [x[0], x[-1]] if scene.members[member].type == "rigid" else x.tolist()
         for contact, record in scene.contacts.items()
         for member in members_of(record, scene.members)
+        if scene.members[member].type != "small"
     }
     flexible = dict.fromkeys(member for (_, member), at in near.items() if len(at) > 2)
     names = [f"members.{member}.position" for member in flexible]
@@ -84,12 +88,28 @@ def margins_of(name: str, base: Model, arguments: Sequence[Argument]) -> ca.Func
     pushes = [outputs.push(point) / base.scales.force for point in points]
     found = [ca.if_else(push > NO_PUSH, push, -FAR) for push in pushes]
     places = [(point, outputs.place(point, 0)) for point in points]
-    found += [end for point, at in places if any(point.slides) for end in (at, 1.0 - at)]
+    along = [(free, outputs.place(point, side)) for point in points for side, free in enumerate(point.slides)]
+    found += [end for free, at in along if free for end in (at, 1.0 - at)]
+
+    def ends_of(member: str) -> ca.MX:
+        nodes = scene.members[member].nodes
+        return ca.vertcat(*(outputs.value(answer_name(f"nodes.{node}.position")) for node in nodes))
+
+    nearby = Closest(scene).nearby(base)
+    for number, pair in enumerate(nearby.pairs):
+        share = np.stack([1.0 - x, x], axis=1)
+        lines = [positions[m] if m in positions else ca.mtimes(share, ends_of(m)) for m in pair.members]
+        left_out: ca.MX | ca.DM = ca.DM(_next_to(nearby, number, x).astype(float))
+        for point, _ in (one for one in places if one[0].pair == pair.key):
+            close = [ca.fabs(ca.DM(x) - outputs.place(point, side)) <= BESIDE / (SAMPLES - 1) for side in (0, 1)]
+            left_out = ca.logic_or(left_out, ca.mtimes(close[0], close[1].T))
+        for squares, rows, columns in _squares(*lines):
+            gaps = (ca.sqrt(ca.fmax(squares, 0.0)) - pair.distance) / scene.size
+            found.append(ca.mmin(ca.if_else(left_out[rows, columns], FAR, gaps)))
     for (contact, member), at in near.items():
-        here = positions.get(member)
-        if here is None:
-            nodes = scene.members[member].nodes
-            here = ca.vertcat(*(outputs.value(answer_name(f"nodes.{node}.position")) for node in nodes))
+        if scene.contacts[contact].between_members:
+            continue
+        here = positions[member] if member in positions else ends_of(member)
         if contact in carriers:
             node = carriers[contact]
             place, turn = (outputs.value(answer_name(f"nodes.{node}.{key}")) for key in ("position", turned))
@@ -109,8 +129,8 @@ def _refuse(base: Model, arguments: Sequence[Argument]) -> None:
     """Refuse contacts and arguments of which it cannot be told whether the same touches."""
     scene = base.scene
     for name, contact in scene.contacts.items():
-        what = "members that touch each other" if contact.between_members else ""
-        what = what or ("an edge without member_radius" if scene.obstacles[name].kind == "sharp" else "")
+        edge = not contact.between_members and scene.obstacles[name].kind == "sharp"
+        what = "an edge without member_radius" if edge else ""
         curved = [
             m
             for m in members_of(contact, scene.members)
@@ -152,10 +172,44 @@ def _gaps(base: Model, contact: str, here: ca.MX) -> ca.MX:
     return distance - base.scene.contacts[contact].member_radius
 
 
+def _next_to(nearby: Nearby, number: int, x: Array) -> Array:
+    """Whether places (n, n) at fractions (n,) of both members of a pair are too near along these to touch, of bool."""
+    s, t = (part.ravel() for part in np.meshgrid(x, x, indexing="ij"))
+    a, b = (nearby.lines.members.index(member) for member in nearby.pairs[number].members)
+    whole = np.full(len(s), number)
+    found = nearby.apart(Places(whole, nearby.lines.at(a, s), nearby.lines.at(b, t), whole))
+    return ~found.reshape(len(x), len(x))
+
+
+def _squares(one: ca.MX, other: ca.MX) -> Iterator[tuple[ca.MX, slice, slice]]:
+    """Squares of distances of places (n, 3) from places (n, 3), as little as between these, and which ones they are.
+
+    They are those of parabolas: along the first line, along the other one, and along both where they are not parallel.
+    """
+    n, inner, every = one.shape[0], slice(1, -1), slice(None)
+    square = ca.repmat(ca.sum2(one**2), 1, n) + ca.repmat(ca.sum2(other**2).T, n, 1) - 2.0 * ca.mtimes(one, other.T)
+    yield _lowest(square[:-2, :], square[1:-1, :], square[2:, :]), inner, every
+    yield _lowest(square[:, :-2], square[:, 1:-1], square[:, 2:]), every, inner
+    f, rows, columns = square[1:-1, 1:-1], (square[2:, 1:-1], square[:-2, 1:-1]), (square[1:-1, 2:], square[1:-1, :-2])
+    slopes = [0.5 * (after - before) for after, before in (rows, columns)]
+    bends = [after - 2.0 * f + before for after, before in (rows, columns)]
+    twist = 0.25 * (square[2:, 2:] - square[2:, :-2] - square[:-2, 2:] + square[:-2, :-2])
+    both = bends[0] * bends[1] - twist**2
+    steps = bends[1] * slopes[0] - twist * slopes[1], bends[0] * slopes[1] - twist * slopes[0]
+    # The parabola is right near its middle.
+    near = ca.logic_and(ca.fabs(steps[0]) <= both, ca.fabs(steps[1]) <= both)
+    below = (slopes[0] * steps[0] + slopes[1] * steps[1]) / (2.0 * ca.if_else(near, ca.fmax(both, 1e-300), 1.0))
+    yield f - ca.if_else(near, below, 0.0), inner, inner
+    yield square[:: n - 1, :: n - 1], slice(None, None, n - 1), slice(None, None, n - 1)
+
+
 def _least(gaps: ca.MX) -> ca.MX:
     """Gaps (n,) at places, in whose middle those that are less than both beside them are as little as a parabola."""
-    before, here, after = gaps[:-2], gaps[1:-1], gaps[2:]
+    return ca.vertcat(gaps[0], _lowest(gaps[:-2], gaps[1:-1], gaps[2:]), gaps[-1])
+
+
+def _lowest(before: ca.MX, here: ca.MX, after: ca.MX) -> ca.MX:
+    """What is at places, in whose middle it is as little as a parabola where it is less than beside them."""
     bend, slope = before - 2.0 * here + after, after - before
     lowest = ca.logic_and(here <= before, here <= after)
-    inner = ca.if_else(ca.logic_and(lowest, bend > 0.0), here - slope**2 / (8.0 * ca.fmax(bend, 1e-300)), here)
-    return ca.vertcat(gaps[0], inner, gaps[-1])
+    return ca.if_else(ca.logic_and(lowest, bend > 0.0), here - slope**2 / (8.0 * ca.fmax(bend, 1e-300)), here)
