@@ -106,7 +106,7 @@ def test_members_that_touch_each_other_are_looked_at_too():
 
 
 def test_members_that_cross_are_seen_as_near_as_they_are():
-    """A cantilever over a rigid bar that crosses it, between the places that are looked at on both: at 0.613 and 0.29."""
+    """A cantilever over a rigid bar that crosses it, between the places that are looked at: at 0.613 and 0.29."""
     table = {
         "dimension": "space",
         "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0}},
