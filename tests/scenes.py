@@ -418,3 +418,31 @@ CROSSING = {
     "contacts": {"c": {"type": "members", "members": "all", "radius": 0.04}},
 }
 """A beam over a post across it, without sections."""
+
+
+FLOOR = {"type": "plane", "point": [0, -0.3], "normal": [0, 1]}
+DRUM = {"type": "circle", "center": [0.6, -0.5], "radius": 0.3}
+
+
+def pressed_on(contact, load=(0, -2), accuracy=1e-9, **more):
+    """A cantilever of unit length with a force at its end, and an obstacle."""
+    return {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"beam": {"nodes": ["A", "B"], "section": "s"}},
+        "loads": {"F": {"type": "force", "node": "B", "value": list(load)}},
+        "contacts": {"c": {**contact, "members": "all"}},
+        "analysis": {"accuracy": accuracy},
+        **more,
+    }
+
+
+def weight(value):
+    return {"W": {"type": "distributed", "member": "beam", "value": [0, value]}}
+
+
+ON_FLOOR = pressed_on({**FLOOR, "point": [0, -0.1]}, loads=weight(-60), accuracy=1e-5)
+ON_DRUM = pressed_on({**DRUM, "center": [0.2, -0.33]}, (0, -30), accuracy=1e-6)
+IN_PIPE = pressed_on(
+    {"type": "circle", "side": "inside", "center": [0.5, 0.3], "radius": 0.6}, loads=weight(-200), accuracy=1e-5
+)

@@ -2,11 +2,9 @@
 
 import casadi as ca
 import pytest
+from scenes import DRUM, FLOOR, IN_PIPE, ON_DRUM, ON_FLOOR
 
-from sfetcas import Design, QuasiStatic, Scene, SceneError, SolveError, find, solve
-
-DRUM = {"type": "circle", "center": [0.6, -0.5], "radius": 0.3}
-FLOOR = {"type": "plane", "point": [0, -0.3], "normal": [0, 1]}
+from sfetcas import Design, QuasiStatic, Scene, SceneError, SolveError, find, parametric, solve
 
 
 def pressed(contacts, load=(0, -2), **more):
@@ -86,21 +84,66 @@ def test_cases_touch_the_same():
     assert apart[0] - apart[1] == pytest.approx(0.0057, abs=1e-6)
 
 
+def test_friction_is_refused():
+    with pytest.raises(SceneError, match=r"contacts\.c\.friction: what sticks .* no part of a design"):
+        find(pressed({"c": {**FLOOR, "friction": 0.3}}), ["sections.s.EI3"], {"reactions.A.moment.z": 1.0})
+
+
+# -- along lines -------------------------------------------------------------------------------------------------
+
+
 @pytest.mark.parametrize(
-    ("contacts", "more", "sentence"),
+    ("kind", "number", "bounds", "moment"),
     [
-        ({"c": {**FLOOR, "friction": 0.3}}, {}, r"contacts\.c\.friction: what sticks .* no part of a design"),
-        (
-            {"c": {**FLOOR, "point": [0, 0]}},
-            {"loads": {"W": {"type": "distributed", "member": "beam", "value": [0, -5]}}},
-            r"member 'beam' lies along contacts\.c, accepted: members that touch at places",
-        ),
+        ("floor", "sections.s.EI3", (0.5, 1.5), 3.6),
+        ("drum", "contacts.c.radius", (0.2, 0.4), 0.76),
+        ("pipe", "loads.W.value.1", (-300, -100), 10.6),
     ],
-    ids=["friction", "lies"],
+    ids=["floor", "drum", "pipe"],
 )
-def test_refused(contacts, more, sentence):
-    with pytest.raises(SceneError, match=sentence):
-        find(pressed(contacts, **more), ["sections.s.EI3"], {"reactions.A.moment.z": 1.0})
+def test_along_a_line(kind, number, bounds, moment):
+    """The number for a moment at the clamp, and how it changes with that, against statics and its derivatives."""
+    scene = Scene.from_dict({"floor": ON_FLOOR, "drum": ON_DRUM, "pipe": IN_PIPE}[kind])
+    problem = design(scene, {number: bounds}, accuracy=1e-5)
+    problem.subject_to(problem.answer("", "reactions.A.moment")[2] == moment, name="clamp")
+    problem.minimise(problem.variable(number))
+    answer = problem.solve()
+    assert answer.stable
+    function = parametric(answer.scene(), [number], ["reactions.A.moment"])
+    there = function.solve()
+    assert function.solver.model.mesh.lies
+    # Elements end where lines do, to the tolerance of the program; forces are known to ten times that.
+    assert there["reactions.A.moment"][2] == pytest.approx(moment, rel=1e-6)
+    slope = there.jacobian["reactions.A.moment"][number][2]
+    assert answer.multipliers["clamp"] * slope == pytest.approx(-1.0, rel=1e-4)
+
+
+def test_answers_along_a_member_that_lies_are_refused():
+    problem = design(Scene.from_dict(ON_FLOOR), {"sections.s.EI3": (0.5, 1.5)})
+    problem.subject_to(problem.answer("", "members.beam.moment", [0.1])[0] == 3.0)
+    with pytest.raises(SceneError, match=r"members\.beam: found an answer along a member that lies along an obstacle"):
+        problem.solve()
+
+
+def test_along_a_line_that_ends_elsewhere_in_each_case():
+    loads = {"soft": {"loads.W.value.1": -60.0}, "hard": {"loads.W.value.1": -150.0}}
+    problem = design(Scene.from_dict(ON_FLOOR), {"sections.s.EI3": (0.5, 1.5)}, cases=loads)
+    problem.subject_to(problem.answer("hard", "reactions.A.moment")[2] == 5.5)
+    answer = problem.solve()
+    soft, hard = (solve(answer.scene(case)).last for case in loads)
+    assert hard.reaction("A")[1][2] == pytest.approx(5.5, rel=1e-6)
+    ends = [step.contacts["c"]["at"][0] for step in (soft, hard)]
+    assert ends[0] - ends[1] == pytest.approx(0.12, abs=0.01)
+
+
+def test_a_path_along_a_line():
+    problem = QuasiStatic(Scene.from_dict(ON_FLOOR), {"loads.W.value.1": (-200, -20)}, points=3, kernels="interpreted")
+    problem.subject_to(problem.answer("reactions.A.moment")[:, 2] == 3.5 + problem.s)
+    problem.minimise(ca.sumsqr(problem.input("loads.W.value.1")) * 1e-6)
+    answer = problem.solve()
+    assert answer.stable
+    assert not answer.jumps
+    assert solve(answer.scene(2)).last.reaction("A")[1][2] == pytest.approx(4.5, rel=1e-6)
 
 
 def test_a_path_of_equilibria_that_touch():

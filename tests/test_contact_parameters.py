@@ -2,26 +2,10 @@
 
 import numpy as np
 import pytest
-from scenes import CARRIED, CROSSING
+from scenes import CARRIED, CROSSING, DRUM, FLOOR, IN_PIPE, ON_DRUM, ON_FLOOR, pressed_on, weight
 
 from sfetcas import Measurement, Scene, SceneError, SolveError, Status, fit, parametric, solve
 from sfetcas.parametric.arguments import with_values
-
-FLOOR = {"type": "plane", "point": [0, -0.3], "normal": [0, 1]}
-DRUM = {"type": "circle", "center": [0.6, -0.5], "radius": 0.3}
-
-
-def table(contact, load=(0, -2), accuracy=1e-9, **more):
-    """A cantilever of unit length with a force at its end, and an obstacle."""
-    return {
-        "sections": {"s": {"EI3": 1.0}},
-        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
-        "members": {"beam": {"nodes": ["A", "B"], "section": "s"}},
-        "loads": {"F": {"type": "force", "node": "B", "value": list(load)}},
-        "contacts": {"c": {**contact, "members": "all"}},
-        "analysis": {"accuracy": accuracy},
-        **more,
-    }
 
 
 def told(scene, names):
@@ -45,15 +29,15 @@ PLACE = ["nodes.B.position", "contacts.c.force", "contacts.c.at", "reactions.A.m
     ("parts", "names"),
     [
         (
-            table(DRUM),
+            pressed_on(DRUM),
             ["contacts.c.center.1", "sections.s.EI3", "nodes.B.position.0"],
         ),
-        (table({**DRUM, "member_radius": 0.02}), ["contacts.c.member_radius"]),
-        (table(EDGE), ["contacts.c.position", "loads.F.value"]),
-        (table(FLOOR, (0.5, -2)), ["contacts.c.point", "contacts.c.normal"]),
-        (table(WALL, (0.3, 0.2, -2), **SPACE), ["contacts.c.normal"]),
-        (table({}, **CARRIED), ["contacts.c.radius", "contacts.c.center", "nodes.D.position"]),
-        (table({}, (0.05, 0.02, -1), **SPACE, **CROSSING), ["contacts.c.radius"]),
+        (pressed_on({**DRUM, "member_radius": 0.02}), ["contacts.c.member_radius"]),
+        (pressed_on(EDGE), ["contacts.c.position", "loads.F.value"]),
+        (pressed_on(FLOOR, (0.5, -2)), ["contacts.c.point", "contacts.c.normal"]),
+        (pressed_on(WALL, (0.3, 0.2, -2), **SPACE), ["contacts.c.normal"]),
+        (pressed_on({}, **CARRIED), ["contacts.c.radius", "contacts.c.center", "nodes.D.position"]),
+        (pressed_on({}, (0.05, 0.02, -1), **SPACE, **CROSSING), ["contacts.c.radius"]),
     ],
     ids=["drum", "radius", "edge", "floor", "space", "carried", "crossing"],
 )
@@ -72,7 +56,7 @@ def test_derivatives_are_those_of_statics(parts, names):
 
 
 def test_second_derivatives():
-    function = parametric(Scene.from_dict(table(DRUM)), ["contacts.c.radius", "loads.F.value"], PLACE)
+    function = parametric(Scene.from_dict(pressed_on(DRUM)), ["contacts.c.radius", "loads.F.value"], PLACE)
     # Elsewhere than where an element ends at the place, where those of the mesh jump.
     here, step = function.solve({"contacts.c.radius": 0.305}), 1e-5
     ends = (function.solve({"contacts.c.radius": 0.305 + sign * step}, here) for sign in (1.0, -1.0))
@@ -84,7 +68,7 @@ def test_second_derivatives():
 
 
 def test_section_forces_beside_a_place_within_an_element():
-    scene = Scene.from_dict(table(DRUM))
+    scene = Scene.from_dict(pressed_on(DRUM))
     at = [0.3, 0.7, 0.79, 0.83, 0.9]
     places = {"beam": at}
     function = parametric(scene, ["loads.F.value"], ["members.beam.force", "members.beam.moment"], places=places)
@@ -101,15 +85,6 @@ def test_section_forces_beside_a_place_within_an_element():
 # -- along lines -------------------------------------------------------------------------------------------------
 
 
-def weight(value):
-    return {"W": {"type": "distributed", "member": "beam", "value": [0, value]}}
-
-
-ON_FLOOR = table({**FLOOR, "point": [0, -0.1]}, loads=weight(-60), accuracy=1e-5)
-ON_DRUM = table({**DRUM, "center": [0.2, -0.33]}, (0, -30), accuracy=1e-6)
-IN_PIPE = table(
-    {"type": "circle", "side": "inside", "center": [0.5, 0.3], "radius": 0.6}, loads=weight(-200), accuracy=1e-5
-)
 TELLS = ["nodes.B.position", "contacts.c.force", "reactions.A.moment"]
 
 
@@ -182,7 +157,7 @@ def test_lines_for_other_numbers_are_found_anew():
 
 
 def two():
-    parts = table({**DRUM, "center": [0.4, -0.3], "radius": 0.25}, accuracy=1e-8)
+    parts = pressed_on({**DRUM, "center": [0.4, -0.3], "radius": 0.25}, accuracy=1e-8)
     parts["contacts"]["d"] = {"type": "circle", "center": [0.8, -0.45], "radius": 0.1, "members": "all"}
     return Scene.from_dict(parts)
 
@@ -207,7 +182,7 @@ def test_what_touches_is_found_anew_where_it_is_something_else():
 
 
 def test_derivatives_where_something_touches_without_a_force():
-    scene = Scene.from_dict(table({**DRUM, "center": [0.5, -0.5], "radius": 0.5}, load=(0, -1e-9)))
+    scene = Scene.from_dict(pressed_on({**DRUM, "center": [0.5, -0.5], "radius": 0.5}, load=(0, -1e-9)))
     answer = parametric(scene, ["loads.F.value"], ["nodes.B.position"]).solve()
     with pytest.raises(SolveError, match=r"contacts\.c touches beam at 0\.5 without a force, and derivatives") as error:
         _ = answer.flat_jacobian
@@ -216,15 +191,15 @@ def test_derivatives_where_something_touches_without_a_force():
 
 def test_stiffness_is_counted_without_where_it_touches():
     """The Lagrangian is largest in where the beam touches; an arch that would snap is unstable all the same."""
-    function = parametric(Scene.from_dict(table(DRUM)), ["loads.F.value"], ["compliance.B"])
+    function = parametric(Scene.from_dict(pressed_on(DRUM)), ["loads.F.value"], ["compliance.B"])
     answer = function.solve()
     assert answer.outcome.negative == 0
-    step = parametric(Scene.from_dict(table(DRUM)), ["loads.F.value"], ["nodes.B.position"]).solve()
+    step = parametric(Scene.from_dict(pressed_on(DRUM)), ["loads.F.value"], ["nodes.B.position"]).solve()
     assert answer["compliance.B"][:2, :2] == pytest.approx(step.jacobian["nodes.B.position"]["loads.F.value"][:2])
 
 
 def test_a_fit_in_contact_finds_the_stiffness():
-    scene = Scene.from_dict(table(DRUM))
+    scene = Scene.from_dict(pressed_on(DRUM))
     true = with_values(scene, {"sections.s.EI3": 1.3})
     seen = Measurement("nodes.B.position", solve(true).last.position("B"), 1e-6)
     found = fit(scene, {"sections.s.EI3": (0.5, 3.0)}, [seen])
@@ -239,13 +214,13 @@ def test_a_fit_in_contact_finds_the_stiffness():
     ("parts", "answers", "sentence"),
     [
         (
-            table({**FLOOR, "friction": 0.3}),
+            pressed_on({**FLOOR, "friction": 0.3}),
             None,
             r"contacts\.c\.friction: what sticks and slides depends on the steps",
         ),
-        (table(DRUM, (0, -20)), ["contacts.d.at"], r"contacts\.d\.at: found 'd', accepted: c"),
+        (pressed_on(DRUM, (0, -20)), ["contacts.d.at"], r"contacts\.d\.at: found 'd', accepted: c"),
         (
-            table(
+            pressed_on(
                 FLOOR,
                 springs={
                     "k": {"type": "translational", "node": "B", "direction": [0, 1], "stiffness": 1.0, "stop": [-1, 1]}
@@ -255,7 +230,7 @@ def test_a_fit_in_contact_finds_the_stiffness():
             r"contacts\.c: what touches beside stops",
         ),
         (
-            table({**FLOOR, "point": [0, -2]}),
+            pressed_on({**FLOOR, "point": [0, -2]}),
             ["contacts.c.at"],
             "touches at 0 places, accepted: one that touches at one",
         ),

@@ -19,7 +19,7 @@ from .formulation import Asked, Formulation, labelled
 
 __all__ = ["REQUIRED", "Assembled", "Pair", "places_asked"]
 
-STEPS, STATES = "steps", "equilibria"
+STEPS, STATES, ENDS = "steps", "equilibria", "where lines end"
 """Names of blocks and pieces."""
 
 REQUIRED = "required "
@@ -65,6 +65,8 @@ class Assembled:
     equations : CaseEquations
     states : ndarray (cases, states)
         Reference states, near equilibria.
+    places : ndarray (cases, ends)
+        Where elements end with lines on obstacles in these states, fractions of the lengths of their members.
     values : mapping of str to ndarray
         Start values of the free numbers.
     pairs : sequence of Pair
@@ -78,6 +80,7 @@ class Assembled:
         formulation: Formulation,
         equations: CaseEquations,
         states: Array,
+        places: Array,
         values: Mapping[str, Array],
         pairs: Sequence[Pair] = (),
         kernels: Kernels = "auto",
@@ -90,7 +93,7 @@ class Assembled:
         self._steps = self._step_block()
         self._names = [one.name for one in equations.arguments.arguments]
         self._fixed = self._defaults()
-        self._numbers = self._number_indices(values)
+        self._numbers = np.concatenate([self._number_indices(values), self._end_indices(places)], axis=1)
         self._w = np.concatenate([self._steps.index, self._numbers], axis=1)
         self._c = np.concatenate([states, self._fixed[:, equations.fixed]], axis=1)
         self._add_equilibria()
@@ -157,6 +160,13 @@ class Assembled:
         self.pieces.add_expression(label, block.symbol - setting.value, unit=abs(start) or 1.0)
         return int(block.index[0])
 
+    def _end_indices(self, places: Array) -> Index:
+        """Where the places at which lines end stand, (cases, ends)."""
+        if not places.size:
+            return np.zeros(places.shape, dtype=np.intp)
+        low, high = self.equations.room
+        return self.pieces.unknowns(ENDS, places, low, high).index
+
     # -- rows -----------------------------------------------------------------------------------------
 
     def _add_equilibria(self) -> None:
@@ -165,6 +175,9 @@ class Assembled:
         unit[: equations.unknowns] = self._load
         labels = [labelled(name, "equilibrium") for name in self.formulation.cases]
         self.pieces.add_rows(STATES, self.equations.balance, self._w, self._c, unit=unit, labels=labels)
+        if self.equations.ends:
+            labels = [labelled(name, ENDS) for name in self.formulation.cases]
+            self.pieces.add_rows(f"rows of {ENDS}", self.equations.beside, self._w, self._c, labels=labels)
 
     def _rows_of(self, asked: Asked) -> list[int]:
         """Which of all results an answer is."""
@@ -301,6 +314,8 @@ class Assembled:
         self._c = np.concatenate([states, self._fixed[:, self.equations.fixed]], axis=1)
         self.states = states
         self.pieces.set_constants(STATES, self._c)
+        if self.equations.ends:
+            self.pieces.set_constants(f"rows of {ENDS}", self._c)
         for number, asked in enumerate(self.formulation.asked.values()):
             self.pieces.set_constants(f"lifted {number}", self._c[list(asked.cases)])
         if self._pairs:
@@ -330,8 +345,13 @@ class Assembled:
     def numbers(self, x: Array) -> Array:
         """All numbers of the scene in all cases, (cases, numbers), in their own units."""
         found = self._fixed.copy()
-        found[:, self.equations.free] = self.unknowns(x)[self._numbers]
+        free = self.equations.free
+        found[:, free] = self.unknowns(x)[self._numbers[:, : len(free)]]
         return found
+
+    def places(self, x: Array) -> Array:
+        """Where elements end with lines on obstacles, (cases, ends), fractions of the lengths of their members."""
+        return np.asarray(self.unknowns(x)[self._numbers[:, len(self.equations.free) :]])
 
     def steps(self, x: Array) -> Array:
         """Steps from the reference states, (cases, total), dimensionless."""

@@ -139,7 +139,7 @@ class Design(Cases):
     Parameters
     ----------
     scene : Scene
-        Static; where members touch something, at places, and the same in all cases.
+        Static; where members touch something, the same in all cases.
     variables : mapping of str to (low, high) or Parameter
         Numbers of the scene that are unknown and the same in all cases, with their bounds (possibly infinite).
     cases : mapping of str to mapping of str to numbers

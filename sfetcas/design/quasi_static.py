@@ -133,7 +133,7 @@ class QuasiStatic(Cases):
     Parameters
     ----------
     scene : Scene
-        Static; where members touch something, at places, and the same everywhere.
+        Static; where members touch something, the same everywhere.
     inputs : mapping of str to (low, high)
         Numbers of the scene that are unknown at each point of the path, with their bounds.
     points : int
@@ -325,6 +325,12 @@ class QuasiStatic(Cases):
         here, state = optimum.cases[i].solved, optimum.cases[i - 1].solved.state
         if _arrives(state, here):
             return True
+        if optimum.equations.ends:
+            begin, end = optimum.numbers[i - 1 : i + 1]
+            led, _ = optimum.equations.led(begin, end, state, optimum.places[i - 1])
+            if led is None:
+                return False
+            return here.prepared.distance(optimum.equations.program.state(led), here.state) < tolerances.SAME_STATE
         names = [one.name for one in optimum.equations.arguments.arguments]
         for share in SHARES:
             numbers = (1.0 - share) * optimum.numbers[i - 1] + share * optimum.numbers[i]

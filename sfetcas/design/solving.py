@@ -14,7 +14,6 @@ from ..contact.kept import Kept
 from ..description.records import counted
 from ..equilibria.settings import Settings
 from ..equilibria.single import solved_from
-from ..equilibria.solution import Equilibrium
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.kernels import Kernels
@@ -101,6 +100,8 @@ class Optimum:
     mesh : Mesh
     equations : CaseEquations
     numbers : ndarray (cases, numbers)
+    places : ndarray (cases, ends)
+        Where lines on obstacles end, fractions of the lengths of their members.
     """
 
     iterate: Iterate
@@ -110,6 +111,7 @@ class Optimum:
     mesh: Mesh
     equations: CaseEquations
     numbers: Array
+    places: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,12 +140,12 @@ class Solving:
         self._solver = solver or Ipopt(tolerance=1e-11, iterations=300, extra=ENOUGH)
         self.iterations = 0
         self._meshes: list[Mesh] = []
-        self._found: dict[int, Equilibrium] = {}
+        self._found: dict[int, Solved] = {}
 
     # -- the beginning ------------------------------------------------------------------------------
 
-    def _pilots(self, values: Mapping[str, Array]) -> dict[int, Equilibrium]:
-        """Equilibria of some cases for values of the unknowns.
+    def _pilots(self, values: Mapping[str, Array]) -> dict[int, Solved]:
+        """Equilibria of some cases for values of the unknowns; along lines that of the first one.
 
         Raises
         ------
@@ -155,19 +157,23 @@ class Solving:
         count = len(self.formulation.cases)
         chosen = sorted({round(x) for x in np.linspace(0, count - 1, min(PILOTS, count))})
         settings = Settings(accuracy=self.formulation.accuracy)
-        found: dict[int, Equilibrium] = {}
+        found: dict[int, Solved] = {}
         self._meshes = []
         for i in chosen:
             scene = self._scene(i, values)
             try:
-                mesh, self._assembly, found[i] = asked_mesh(scene, settings)
+                mesh, self._assembly, answer = asked_mesh(scene, settings, lines=True)
             except SceneError as error:
                 raise SceneError(labelled(self.formulation.cases[i], str(error)), ("guess",)) from None
+            found[i] = solved_from(answer)
             self._meshes.append(mesh)
             if what_touches(mesh) != what_touches(self._meshes[0]):
                 names = " and ".join(labelled(self.formulation.cases[k], "").rstrip(": ") for k in (chosen[0], i))
                 detail = f"something else touches in the cases {names}, accepted: the same in all cases"
                 raise SolveError(Status.FAILED, detail)
+        if self._meshes[0].lies:
+            # What stands for a line is another number of points in each case; elements follow where it ends.
+            self._meshes, found = self._meshes[:1], {0: found[0]}
         return found
 
     def _scene(self, case: int, values: Mapping[str, Array]) -> Any:
@@ -180,31 +186,41 @@ class Solving:
         arguments, unknown = self.formulation.varying()
         names, places = places_asked(self.formulation)
         free = np.flatnonzero(unknown).tolist()
+        for name in sorted({point.members[0] for point in mesh.line_ends} & places.keys()):
+            message = "found an answer along a member that lies along an obstacle"
+            raise SceneError(
+                f"{message}, accepted: answers of nodes, reactions and contacts beside it", ("members", name)
+            )
         return CaseEquations(self.formulation.scene, mesh, self._assembly, arguments, free, names, places)
 
-    def _begun(self, equations: CaseEquations, pilots: Mapping[int, Equilibrium], values: Mapping[str, Array]) -> Array:
-        """Equilibria for values of the unknowns, those without a pilot from the case before."""
+    def _begun(
+        self, equations: CaseEquations, pilots: Mapping[int, Solved], values: Mapping[str, Array]
+    ) -> tuple[Array, Array]:
+        """Equilibria for values of the unknowns, those without a pilot from the case before, and where lines end."""
         formulation, program = self.formulation, equations.program
         names = [one.name for one in equations.arguments.arguments]
-        states: list[Array] = []
+        states, ends, every = list[Array](), [equations.arguments.places], list[Array]()
         for i, case in enumerate(formulation.cases):
             own = formulation.numbers_of(i, values)
             defaults = equations.arguments.defaults
-            numbers = np.array([own.get(name, x) for name, x in zip(names, defaults, strict=True)])
-            starts = [self._start(i, values, pilots[i], equations)] if i in pilots else []
-            starts += [program.state(states[-1])] if states else []
-            found = next((s for s in (equations.equilibrium(numbers, x)[0] for x in starts) if s is not None), None)
+            every.append(np.array([own.get(name, x) for name, x in zip(names, defaults, strict=True)]))
+            found, places = None, ends[-1]
+            if i in pilots:
+                found, places = equations.fitted(every[i], self._start(i, values, pilots[i], equations), places)
+            if found is None and states:
+                found, places = equations.led(every[-2], every[-1], program.state(states[-1]), ends[-1])
             if found is None:
                 detail = labelled(case, "no equilibrium was found at the guess, accepted: a guess that has one")
                 raise SolveError(Status.FAILED, detail)
             states.append(found)
-        return np.stack(states)
+            ends.append(places)
+        return np.stack(states), np.stack(ends[1:])
 
-    def _start(self, case: int, values: Mapping[str, Array], pilot: Equilibrium, equations: CaseEquations) -> State:
+    def _start(self, case: int, values: Mapping[str, Array], pilot: Solved, equations: CaseEquations) -> State:
         """A pilot as a state of the equations."""
         if not equations.mesh.points:
             return transferred(pilot.model, pilot.state, equations.model)
-        return in_contact(self._kept(case, values, solved_from(pilot)), equations.model)
+        return in_contact(self._kept(case, values, pilot), equations.model)
 
     def _kept(self, case: int, values: Mapping[str, Array], found: Solved) -> Kept:
         """What touches in a state of a case."""
@@ -252,21 +268,25 @@ class Solving:
         pilots = self._pilots(values)
         mesh = _united(self._meshes)
         equations = self._equations(mesh)
-        states = self._begun(equations, pilots, values)
+        states, places = self._begun(equations, pilots, values)
         pairs: list[Pair] = []
         for rounds in range(ROUNDS):
-            program = Assembled(self.formulation, equations, states, values, pairs, self._kernels)
+            program = Assembled(self.formulation, equations, states, places, values, pairs, self._kernels)
             self._refuse_too_many(program)
             result, cases = self._best(program)
-            states, values = program.arrived(result.x), program.values(result.x)
+            states, values, places = program.arrived(result.x), program.values(result.x), program.places(result.x)
             error = max(case.error for case in cases)
             if error > self.formulation.accuracy:
-                fitted = self._fitted(values) if mesh.points and not rounds else None
+                fitted = self._fitted(values) if mesh.points and not (rounds or mesh.lies) else None
                 if fitted and what_touches(fitted) != what_touches(mesh):
                     return self._answer(program, result, cases), error
-                mesh = fitted or mesh.refined()
+                halved = self._halved(values, cases[0]) if mesh.lies else None
+                mesh = fitted or halved or mesh.refined()
                 finer = self._equations(mesh)
-                states = self._begun(finer, self._found, values) if fitted else _onto(equations, finer, states)
+                if fitted or halved:
+                    states, places = self._begun(finer, self._found, values)
+                else:
+                    states = _onto(equations, finer, states)
                 equations, pairs = finer, []
                 continue
             more = self._unstable(cases, program, result, pairs)
@@ -284,6 +304,14 @@ class Solving:
         """A mesh in which elements end where places touch for values of the unknowns."""
         self._found = self._pilots(values)
         return _united(self._meshes)
+
+    def _halved(self, values: Mapping[str, Array], case: Certified) -> Mesh | None:
+        """A mesh of half as long elements with what touches in the first case there; None where that is lost."""
+        finer = self._kept(0, values, case.solved).halved()
+        if finer is None:
+            return None
+        self._found = {0: finer}
+        return self._kept(0, values, finer).mesh
 
     def _refuse_too_many(self, program: Assembled) -> None:
         free, rows = program.freedom
@@ -361,11 +389,11 @@ class Solving:
 
     def _certified(self, program: Assembled, result: NLPResult) -> list[Certified]:
         equations, found = program.equations, []
-        states, values = program.arrived(result.x), program.values(result.x)
+        states, values, places = program.arrived(result.x), program.values(result.x), program.places(result.x)
         for i, case in enumerate(self.formulation.cases):
-            state = equations.program.state(states[i])
+            state, scene = equations.program.state(states[i]), self._scene(i, values)
             try:
-                found.append(certified(self._scene(i, values), equations, state, case))
+                found.append(certified(scene, equations, state, case, places[i], self.formulation.accuracy))
             except SolveError as error:
                 raise SolveError(error.status, error.detail, self._iterate(program, result)) from None
         return found
@@ -443,6 +471,7 @@ class Solving:
             mesh=program.equations.mesh,
             equations=program.equations,
             numbers=program.numbers(result.x),
+            places=program.places(result.x),
         )
 
 
