@@ -41,8 +41,8 @@ than so many times the accuracy: an eighth of it is the rotation by a force that
 """
 
 FLAT = 1e-3
-"""Gap between places where members touch each other, over the sum of the radii, up to which three of these are seen as
-one line where they cannot slide: what members may penetrate each other by, too.
+"""Gap between places where members touch each other, over the sum of the radii, up to which these are seen as one
+line where they cannot slide: what members may penetrate each other by, too.
 """
 
 LIFTED = 3e-6
@@ -267,7 +267,8 @@ class Lines:
     def lengthened(self, found: Solved, least: int = LINE) -> tuple[Mesh, Points] | None:
         """Mesh and points where a pair that touches at so many places is a line from now on; None for none.
 
-        Of members that touch each other it is three, and only with ``SHORT_LINE``, where they cannot slide.
+        Members that touch each other become one where they are as near between the places, and with ``SHORT_LINE``
+        alone: where these cannot slide.
         """
         points = points_of(found)
         for key, pair in self.closest.pairs.items():
@@ -277,8 +278,10 @@ class Lines:
             places = [point.at[0] for point in own]
             # What touches at a node touches with all members there.
             places += [x for x in self._shared(pair, points) if x not in places]
-            needed = least if pair.stop is not None else LINE if least < LINE else np.inf
             known = key in self.keys
+            needed = (
+                least if pair.stop is not None else LINE if least < LINE and self._flat(found, pair, places) else np.inf
+            )
             # Points that have slid to where others are, or begin there, make no line.
             apart = np.diff(np.sort(places)) * self.closest.lengths[pair.members[0]] >= ONE * SAME * pair.width
             if (self.chosen(key) or not any(map(slides, own))) if known else 1 + apart.sum() < needed:
@@ -297,20 +300,23 @@ class Lines:
         return mesh, (*others, *self.laid(one for one in near if low <= one.at[0] <= high))
 
     def parallel(self, found: Solved, mesh: Mesh) -> tuple[Mesh, Points] | None:
-        """The mesh and points where members that touch each other at three places or more, and are as near between
-        them, are a line from now on; None for none.
+        """The mesh and points where members that touch each other, and are as near between the places, are a line from
+        now on; None for none.
         """
         for key, pair in self.closest.pairs.items():
             own = [p for p in points_of(found) if p.pair == key and beside_ends(p)]
             if pair.stop is not None or key in self.keys or len(own) < LINE or not self.bends(pair.members[0]):
                 continue
-            places = np.sort([point.at[0] for point in own])
-            middles = 0.5 * (places[1:] + places[:-1])
-            near = {one.at[0] for one in self.closest.beside(found.fields, pair, middles, FLAT * pair.distance)}
-            flat = np.isin(middles, list(near))
-            if (flat[1:] & flat[:-1]).any():
-                return self._as_line(found, mesh, pair, places.tolist())
+            places = [point.at[0] for point in own]
+            if self._flat(found, pair, places):
+                return self._as_line(found, mesh, pair, places)
         return None
+
+    def _flat(self, found: Solved, pair: Pair, places: Sequence[float]) -> bool:
+        """Whether two members are as near between places at which they touch each other, three or more, as there."""
+        middles = 0.5 * (np.sort(places)[1:] + np.sort(places)[:-1])
+        near = {one.at[0] for one in self.closest.beside(found.fields, pair, middles, FLAT * pair.distance)}
+        return len(places) >= LINE and near == set(middles.tolist())
 
     def _shared(self, pair: Pair, points: Points) -> list[float]:
         """Ends of the member of a pair on an obstacle that are nodes at which points of other members are."""

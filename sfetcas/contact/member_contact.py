@@ -548,7 +548,7 @@ class MemberContact:
                     # All at once is faster; where that leads nowhere, one after the other.
                     careful, found = True, source
                 elif solved and least > SHORT_LINE:
-                    # Places between which a member is flat, or members are parallel, may slide anywhere there.
+                    # Places between which a member is flat may slide anywhere there.
                     least, found = SHORT_LINE, source
                 else:
                     return None
