@@ -21,7 +21,7 @@ from ..mechanics.segments import stations_of_line
 from .closest import Closest
 from .pairs import Near
 
-__all__ = ["FIRM", "Gripping", "Placed"]
+__all__ = ["CENTRED", "FIRM", "Gripping", "Placed"]
 
 CENTRED = 1e-4
 """Angle, rad, and share of the size of the scene, by which a point may have moved from where friction is set up there:

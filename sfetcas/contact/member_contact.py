@@ -37,7 +37,7 @@ from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
 from .closest import Closest
 from .edges import Edges
-from .gripping import FIRM, Gripping, Placed
+from .gripping import CENTRED, FIRM, Gripping, Placed
 from .lines import LINE, SHORT_LINE, Lines, Points, begun, ends_of, points_of
 from .pairs import ONE, Near, PairKey
 
@@ -671,8 +671,10 @@ class MemberContact:
             free = [False]
         elif not all(free):
             slopes = self.closest.slopes(fields, point.pair, at)
-            # At an end a point goes inwards where that is nearer; what lies there stays.
-            free = [0.0 < x < 1.0 or (0.5 - x) * slope < -LIES for x, slope in zip(at, slopes.tolist(), strict=True)]
+            # At an end a point goes inwards where that is nearer; what lies there stays.  With friction it would go to
+            # where that was before it was set up.
+            lies = CENTRED if point.grip else LIES
+            free = [0.0 < x < 1.0 or (0.5 - x) * slope < -lies for x, slope in zip(at, slopes.tolist(), strict=True)]
         ends_line = all(point.sides) and not point.line and (point.pair, point.at[0]) in ends
         slides = (free[0] and (ends_line or not self.lines.has(point)), *free[1:])
         same = not point.new and slides == point.slides
