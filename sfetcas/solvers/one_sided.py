@@ -126,12 +126,13 @@ class OneSided(AtLoads):
         pushes[:, 0] += forces
         basic = np.where(self.acting[:, None], pushes, gaps)
         found = by_pivots(basic[:, 1:], basic[:, 0])
-        if found is None:
-            return self._with_factor(moved[:, 0], factor[0])
-        self.acting[found > 0.0] ^= True
+        if found is not None:
+            self.acting[found > 0.0] ^= True
         if here.residual <= AGAIN:
             chosen = self.acting.tobytes()
             self._tried[chosen] = self._tried.get(chosen, 0) + 1
+        if found is None:
+            return self._with_factor(moved[:, 0], factor[0])
         shares = np.append(1.0, found)
         step = moved @ shares
         step[rows[~self.acting]] = -(signs * forces)[~self.acting]
