@@ -405,6 +405,7 @@ def _reach(tangent: Array, b2: Array, kappas: Table) -> Array:
 
 UNITS: dict[str, dict[str, tuple[int, int, int]]] = {
     "sections": dict.fromkeys(("EI2", "EI3", "GJ"), (1, 2, 0))
+    | dict.fromkeys(("EA", "GA2", "GA3"), (1, 0, 0))
     | {"rhoA": (1, -2, 2), "rhoI": (1, 0, 2), "damping": (0, 0, 1), "drag": (1, -2, 1), "rho": (1, -4, 2)}
     | dict.fromkeys(("E", "G"), (1, -2, 0))
     | dict.fromkeys(("width", "height", "radius", "outer", "inner"), (0, 1, 0)),
@@ -414,7 +415,8 @@ UNITS: dict[str, dict[str, tuple[int, int, int]]] = {
     "rotational": {"stiffness": (1, 1, 0), "damping": (1, 1, 1)},
     "translational": {"stiffness": (1, -1, 0), "damping": (1, -1, 1)}
     | dict.fromkeys(("rest", "length", "stop"), (0, 1, 0)),
-    "contacts": {"radius": (0, 1, 0)},
+    "contacts": {"radius": (0, 1, 0), "member_radius": (0, 1, 0)},
+    "actuations": {"value": (0, -1, 0)},
     "histories": {"t": (0, 0, 1)},
     "analysis": dict.fromkeys(("end", "output", "step"), (0, 0, 1)),
 }
@@ -471,7 +473,7 @@ def transformed(
         # The side of what is round is a word.
         entry |= {key: vector(entry[key]) for key in DIRECTIONS if not isinstance(entry.get(key, ""), str)}
 
-    for kind in ("sections", "nodes", "contacts", "histories"):
+    for kind in ("sections", "nodes", "contacts", "actuations", "histories"):
         for entry in table.get(kind, {}).values():
             if kind != "histories" or table.get("analysis", {}).get("type") == "dynamic":
                 measured(entry, kind)

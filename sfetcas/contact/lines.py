@@ -257,7 +257,7 @@ class Lines:
             gaps = np.array([near[x].gap if x in near else 0.0 for x in cuts.tolist()])
             padded = np.concatenate([[0.0], gaps, [0.0]])
             # Where all of it is nearly at a gap of zero what is in by rounding would come and go.
-            least = tolerance if pair.stop is None or self.chosen(key) else tolerances.DECIMAL * pair.width
+            least = tolerance if pair.stop is None or self.chosen(key) else tolerances.CLOSED * self.scene.size
             deep = (gaps <= padded[:-2]) & (gaps <= padded[2:]) & (gaps < -least)
             found += [near[x] for x in cuts[deep].tolist()]
         return found

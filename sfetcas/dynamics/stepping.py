@@ -72,12 +72,15 @@ REACH = 2.0
 CLOSE = 0.01
 """That distance at least, over the smallest distance of touching lines, or over the unit of length."""
 
+NARROW = 1e-3
+"""Gap, over the smallest distance of touching lines, up to which contacts may push after an iteration."""
+
 ITERATIONS, SLIDING, SLID = 40, 4, 1e-8
 """Iterations of Newton's method at most, in how many of them places go on to where the distance is least, and how
 little of the unit of length they move then where they have arrived.
 """
 
-SEARCHES, COPIED = 30, 3
+SEARCHES, COPIED = 30, 1
 """Searches after a step at most, and after how many of them places go on that are added."""
 
 SHORTER = 12
@@ -122,6 +125,14 @@ class _End:
     forces: Array
     acting: Near
     factors: Any = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Chosen:
+    """Which contacts (n,), of bool, may push in an iteration, and what their forces change at them."""
+
+    looked: Array
+    yielding: Sparse
 
 
 @final
@@ -291,7 +302,7 @@ class Stepping(Integrator):
         order, back = equations.order, np.argsort(equations.order)
         touching, state, near, forces = self._touching, end.state, end.near, end.forces
         acting, factors = near, end.factors
-        yielding: Sparse = np.zeros((0, 0))
+        kept: _Chosen | None = None
         for k in range(ITERATIONS):
             matrix, residual, x = equations.positions(state, course.begin, course.h, course.factors)
             if not (np.isfinite(residual).all() and np.isfinite(matrix.data).all()):
@@ -316,12 +327,13 @@ class Stepping(Integrator):
             if len(near):
                 here = touching.rows(course.before, pose, near, acting).matrix(touching.lines)
                 opened = np.concatenate([touching.gaps(pose, near), touching.slips(course.before, pose, acting)])
-                if fresh or slides or yielding.shape[0] != len(given):
-                    yielding = self._bodies.coupled(solve, here, along)
-                found = complementary(yielding, opened + here @ step - yielding @ given, given, friction)
+                if fresh or slides or (kept is not None and len(kept.looked) != len(near)):
+                    kept = None
+                found = self._forces(solve, (here, along), opened, given, step, friction, kept)
                 if found is None:
                     return None
-                step, forces = step + solve(along.T @ (found - given)), _arranged(found, friction, forces)
+                given, step, kept = found
+                forces = _arranged(given, friction, forces)
             state, before = self.system.equations.moved(state, step), moved
             moved = float(np.abs(step[:unknowns]).max(initial=0.0))
             if not moved < FAR:
@@ -332,6 +344,54 @@ class Stepping(Integrator):
             # Rounding may leave more than that, which falls no further.
             last = not slides and moved <= (CONVERGED if moved < 0.5 * before else LAST_CHANGE)
         return None
+
+    def _forces(
+        self,
+        solve: Callable[[Array], Array],
+        rows: tuple[Sparse, Sparse],
+        opened: Array,
+        given: Array,
+        step: Array,
+        friction: Friction,
+        kept: _Chosen | None,
+    ) -> tuple[Array, Array, _Chosen] | None:
+        """Forces (n,), the step with them, and of which contacts they are sought; None where none are found.
+
+        Of all that is looked at only what may push has a part in it: what has pushed, and what the step closes.
+
+        Parameters
+        ----------
+        solve : callable
+            Newton's step for a residual.
+        rows : (here, along)
+            Derivatives of gaps and slips, and ways of forces.
+        opened, given : ndarray (n,)
+            Gaps and slips, and forces before.
+        step : ndarray (total,)
+            With these forces.
+        friction : Friction
+        kept : optional
+            What has been chosen with the same factors before.
+        """
+        (here, along), count, before = rows, len(opened) - friction.along.size, step
+        looked = (given[:count] > 0.0) | ((opened + here @ step)[:count] < NARROW * self._touching.distance)
+        if kept is not None:
+            looked |= kept.looked
+        while True:
+            chosen, own = friction.of(looked)
+            if kept is None or (looked != kept.looked).any():
+                kept = _Chosen(looked.copy(), self._bodies.coupled(solve, here[chosen], along[chosen]))
+            right = (opened + here @ before)[chosen] - kept.yielding @ given[chosen]
+            found = complementary(kept.yielding, right, given[chosen], own)
+            if found is None:
+                return None
+            after = given.copy()
+            after[chosen] = found
+            step = before + solve(along.T @ (after - given))
+            closed = ((opened + here @ step)[:count] < -INSIDE) & ~looked
+            if not closed.any():
+                return after, step, kept
+            looked |= closed
 
     def _slid(self, pose: Pose, near: Near, forces: Array) -> tuple[Near, Array, bool]:
         """What is looked at where places have gone on to where the distance is least, the forces, and whether that is

@@ -5,13 +5,12 @@
 With friction further numbers ``y`` belong to one of ``x``, which may be at most ``mu x`` together, and the slips ``v``
 are further rows of ``A x + b``: ``y = - mu x v / |v|`` where ``v`` is not zero.
 
-With few forces, or where what they do to each other is no energy: pivots, all wrong signs at once and, where that goes
-round, Lemke's, which lead to a solution wherever ``A`` is of an energy, and mostly where it is not.
-
-With many forces ``A`` is sparse.  Which forces push is mostly known from a problem like it: Newton's method on
-``min(x, A x + b) = 0``, which lets all that is infeasible change sides at once, then ends within a few steps.  Where it
-does not, an interior-point method leads to the solution in a number of steps that hardly grows.  Where rows depend on
-each other a small diagonal makes the solution unique.  It multiplies the change from a solution that is near, so that
+Which forces push is mostly known from a problem like it: Newton's method on ``min(x, A x + b) = 0``, which lets all
+that is infeasible change sides at once, then ends within a few steps.  Where it does not, or nothing is known, there
+are pivots, all wrong signs at once and, where that goes round, Lemke's, which lead to a solution wherever ``A`` is of
+an energy, and mostly where it is not.  With many forces ``A`` is sparse, and an interior-point method leads to the
+solution in a number of steps that hardly grows, where it is of an energy.  Where rows depend on each other a small
+diagonal makes the solution unique.  It multiplies the change from a solution that is near, so that
 it has no part in where a sequence of such solutions ends.
 
 Coulomb's law is that ``y`` is the nearest to ``y - v`` that is allowed.  Newton's method for this equation begins with
@@ -46,6 +45,9 @@ SOLVED = 1e-11
 FEW, MOST = 15, 100
 """Steps of Newton's method, and of the interior-point method, at most."""
 
+DENSE = 400
+"""Numbers of a problem up to which a dense matrix is faster than a sparse one."""
+
 BLOCKS, PIVOTS = 8, 10
 """Block pivots without fewer wrong signs, after which single ones follow; of these at most as many over the number of
 rows.
@@ -76,6 +78,15 @@ class Friction:
 
     def __len__(self) -> int:
         return len(self.across)
+
+    def of(self, chosen: Array) -> tuple[Index, Friction]:
+        """Numbers of chosen contacts (n,), of bool, and of what is along their surfaces; their law alone."""
+        rubs = chosen[self.across]
+        rows = np.concatenate([np.flatnonzero(chosen), self.along[rubs].ravel()]).astype(np.intp)
+        count = int(chosen.sum())
+        across = np.cumsum(chosen)[self.across[rubs]] - 1
+        along = count + np.arange(self.along[rubs].size, dtype=np.intp).reshape(self.along[rubs].shape)
+        return rows, Friction(across, along, self.coefficients[rubs])
 
     def scaled(self, lengths: Array) -> Friction:
         """The same law where forces act along vectors of some lengths (n,)."""
@@ -127,8 +138,12 @@ def complementary(matrix: Sparse, b: Array, near: Array, friction: Friction | No
 
 def _smooth(matrix: Sparse, b: Array, begin: Array, least: float) -> Array | None:
     """The solution without friction."""
-    x = _by_newton(matrix, b, begin, least)
-    return _from_inside(matrix, b, least) if x is None else x
+    if len(b) > DENSE:
+        x = _by_newton(matrix, b, begin, least)
+        return _from_inside(matrix, b, least) if x is None else x
+    dense = matrix.toarray()
+    x = _by_newton(dense, b, begin, least)
+    return by_pivots(dense, b) if x is None else x
 
 
 def by_pivots(matrix: Array, b: Array) -> Array | None:
@@ -212,19 +227,24 @@ def _by_single_pivots(matrix: Array, b: Array) -> Array | None:
 
 def _by_newton(matrix: Sparse, b: Array, begin: Array, least: float) -> Array | None:
     """Newton's method on the complementarity; None where it does not end soon."""
-    from scipy.sparse.linalg import splu
-
     x, opening = begin, matrix @ begin + b
     for _ in range(FEW):
-        pushes = x > opening
-        chosen = np.flatnonzero(pushes)
+        chosen = np.flatnonzero(x > opening)
         x = np.zeros(len(b))
         if len(chosen):
-            x[chosen] = splu(matrix[:, chosen][chosen]).solve(-b[chosen])
+            x[chosen] = _solved(matrix[:, chosen][chosen], -b[chosen])
         opening = matrix @ x + b
         if np.abs(np.minimum(x, opening)).max(initial=0.0) <= least:
             return np.maximum(x, 0.0)
     return None
+
+
+def _solved(matrix: Sparse, right: Array) -> Array:
+    """The solution with a matrix that is sparse or dense."""
+    from scipy.sparse.linalg import splu
+
+    dense = isinstance(matrix, np.ndarray)
+    return np.asarray(np.linalg.solve(matrix, right) if dense else splu(matrix).solve(right))
 
 
 def _from_inside(matrix: Sparse, b: Array, least: float) -> Array | None:
