@@ -8,6 +8,7 @@ from motions import FLAT, SMOOTH, THICK, cantilever, changed, moved, tip
 
 import sfetcas
 from sfetcas import Scene
+from sfetcas.dynamics.simulation import Simulation
 from sfetcas.mathematics import quaternion as quat
 
 pytestmark = pytest.mark.usefixtures("interpreted")
@@ -280,3 +281,14 @@ def test_forces_that_are_open_are_shared_as_in_statics():
     for step in sfetcas.solve(scene).steps:
         np.testing.assert_allclose(step.reaction("A")[0], [-0.7, 0.0, 0.0], atol=1e-9)
         np.testing.assert_allclose(step.along("m", [0.1, 0.5])["force"][:, 0], [0.7, -0.3], atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1.0 / 0.7071, 0.7071**2])
+def test_a_time_that_rounding_keeps_from_another_one_is_no_further_one(unit):
+    """Eleven intervals, the sixth of which ends at a time that an expectation tells: 0.3 is not six times 0.05."""
+    table = cantilever()
+    table["analysis"] = {"type": "dynamic", "end": 0.55 * unit, "output": 0.05 * unit}
+    table["expect"] = [{"quantity": "nodes.B.position", "time": 0.3 * unit, "value": [0, 0, 0], "tolerance": 1.0}]
+    times = Simulation(Scene.from_dict(table), sfetcas.Settings(), None).times
+    assert len(times) == 12
+    assert {0.3 * unit, 0.55 * unit} <= set(times.tolist())

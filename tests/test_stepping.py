@@ -411,9 +411,11 @@ def test_what_begins_inside_is_refused():
 # -- parts --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("dense", [0, complementarity.DENSE])
 @pytest.mark.parametrize(("count", "rank"), [(6, 6), (8, 5)])
-def test_complementarity_against_all_choices(count, rank):
+def test_complementarity_against_all_choices(count, rank, dense, monkeypatch):
     """Also where rows depend on each other: then what they do together is unique."""
+    monkeypatch.setattr(complementarity, "DENSE", dense)
     rng = np.random.default_rng(count)
     rows = rng.normal(size=(count, rank))
     matrix, b = rows @ rows.T, rows @ rng.normal(size=rank)
@@ -434,6 +436,25 @@ def test_complementarity_against_all_choices(count, rank):
         if (x >= -1e-12).all() and (matrix[:, list(chosen)] @ x + b >= -1e-9).all()
     ]
     np.testing.assert_allclose(rows.T @ found, best[0], atol=1e-7)
+
+
+def test_complementarity_where_forces_are_no_energy(monkeypatch):
+    """As those of members that are nearly parallel; the interior-point method ends without a solution here."""
+    rng, count = np.random.default_rng(40), 30
+    places = np.linspace(0.0, 1.0, count)
+    right = np.stack([np.cos(k * places + rng.normal()) for k in range(8)], axis=1)
+    left = right + 0.8 * rng.normal(size=right.shape)
+    matrix, b = left @ right.T, left @ rng.normal(size=8)
+    assert np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min() < -1.0
+    found = complementary(csc_matrix(matrix), b, np.zeros(count))
+    monkeypatch.setattr(complementarity, "DENSE", 0)
+    assert complementary(csc_matrix(matrix), b, np.zeros(count)) is None
+    assert found is not None
+    opening = matrix @ found + b
+    # The small diagonal has its share, which a second solution takes back.
+    assert found.min() >= 0.0
+    assert opening.min() > -1e-5
+    assert abs(found @ opening) < 1e-4
 
 
 @pytest.mark.parametrize("directions", [1, 2])

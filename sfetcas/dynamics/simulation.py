@@ -147,8 +147,11 @@ class Simulation:
         end = analysis.duration
         spacing = analysis.output or end / OUTPUTS
         regular = spacing * np.arange(int(np.floor(end / spacing * (1.0 + tolerances.DECIMAL))) + 1)
-        wanted = [expect.time for expect in self.scene.expect if expect.time is not None]
-        return np.unique(np.concatenate([np.minimum(regular, end), wanted, [end]]))
+        told = np.unique([*(expect.time for expect in self.scene.expect if expect.time is not None), end])
+        # A multiple of the spacing that rounding alone keeps from a time that is told is that time.
+        regular = np.minimum(regular, end)
+        others = np.abs(regular[:, None] - told).min(axis=1) > tolerances.DECIMAL * end
+        return np.unique(np.concatenate([regular[others], told]))
 
     def _breaks(self, unit: float) -> list[float]:
         """Times at which loads or motions have a kink, and the end, dimensionless."""
