@@ -124,30 +124,37 @@ class StepEquations:
 
     def __init__(self, system: StageEquations) -> None:
         self.system = system
-        self._middle, self._moving, self._order = self._positions()
+        self._middle, self._balance, self._moving, self._order = self._positions()
         self._whole, self._size = Filled(self._order.pattern), system.total
 
-    def _positions(self) -> tuple[Batch, Batch, Any]:
+    def _positions(self) -> tuple[Batch, Batch, Batch, Any]:
         system = self.system
         q, y, lam, begin, h, factors = symbols_of_step(system)
         found = Middle(system, begin, h, factors, q, y, lam)
         matrix, order = system.matrix(found.entries, [2.0 / h**2], begin.unwrapped)
         x = system.moving(q, y, system.given(factors[:, 1]), begin.unwrapped)
         arguments = [q, y, lam, begin.q, begin.y, begin.x, begin.rates, begin.unwrapped, h, factors]
-        function = ca.Function("positions", arguments, [matrix, ca.densify(found.residual), ca.densify(x)])
+        outputs = [ca.densify(found.residual), ca.densify(x)]
+        function = ca.Function("positions", arguments, [*outputs, matrix])
+        balance = ca.Function("balance", arguments, outputs)
         end = ca.MX.sym("end", system.layout.factors)
         x = system.moving(q, y, system.given(end), begin.unwrapped)
         moving = ca.Function("moving", [q, y, end, begin.unwrapped], [ca.densify(x)])
-        return Batch(function, 1), Batch(moving, 1), order
+        return Batch(function, 1), Batch(balance, 1), Batch(moving, 1), order
 
-    def positions(self, now: State, begin: Moving, h: float, factors: Array) -> tuple[Sparse, Array, Array]:
-        """Matrix (total, total) in the order of elimination, residual (total,), and quantities at the end of a step."""
+    def positions(
+        self, now: State, begin: Moving, h: float, factors: Array, *, fresh: bool
+    ) -> tuple[Array, Array, Sparse | None]:
+        """Residual (total,) and quantities at the end of a step; if ``fresh`` also the matrix (total, total) in the
+        order of elimination.
+        """
+        batch = self._middle if fresh else self._balance
         given = now.q, now.y, now.lam, begin.state.q, begin.state.y, begin.x, begin.v
         for i, values in enumerate((*given, begin.state.unwrapped, np.array([h]), factors)):
             if values.size:
-                self._middle.set(i, values)
-        matrix, residual, x = self._middle()
-        return self._whole(matrix), residual.ravel().copy(), x.ravel().copy()
+                batch.set(i, values)
+        residual, x, *matrix = batch()
+        return residual.ravel().copy(), x.ravel().copy(), self._whole(matrix[0]) if fresh else None
 
     def quantities(self, now: State, factors: Array) -> Array:
         """The quantities (quantities,) in a state."""

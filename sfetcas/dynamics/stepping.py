@@ -304,8 +304,10 @@ class Stepping(Integrator):
         acting, factors = near, end.factors
         kept: _Chosen | None = None
         for k in range(ITERATIONS):
-            matrix, residual, x = equations.positions(state, course.begin, course.h, course.factors)
-            if not (np.isfinite(residual).all() and np.isfinite(matrix.data).all()):
+            # Near the end the same factors do as well.
+            fresh = factors is None or moved > FRESH
+            residual, x, matrix = equations.positions(state, course.begin, course.h, course.factors, fresh=fresh)
+            if not (np.isfinite(residual).all() and (matrix is None or np.isfinite(matrix.data).all())):
                 return None
             pose = self._pose(state, x)
             slides = k < SLIDING and bool((near.places.held < 3).any())
@@ -315,9 +317,7 @@ class Stepping(Integrator):
             acting = touching.passed(course.before, pose, near) if k <= SLIDING else acting
             rows = touching.rows(course.before, pose, acting, middle=True)
             along, friction = rows.matrix(touching.lines), friction.scaled(rows.lengths)
-            # Near the end the same factors do as well.
-            fresh = factors is None or moved > FRESH
-            factors = factored(matrix) if fresh else factors
+            factors = factors if matrix is None else factored(matrix)
 
             def solve(right: Array, factors: Any = factors) -> Array:
                 return np.asarray(factors.solve(right[order])[back])
