@@ -997,3 +997,25 @@ def test_node_held_inside_an_obstacle_is_told_before_anything_is_solved(monkeypa
     )
     with pytest.raises(SolveError, match=r"node B is held 0\.02 m inside contacts\.ceiling"):
         solve(scene)
+
+
+def test_a_tip_stays_on_the_side_from_which_it_comes_to_a_thin_cylinder():
+    """A long step leads through it: pushed out to the nearest side from there, the tip would rest on the other one."""
+    table = {
+        "dimension": "space",
+        "sections": {"s": {"EI2": 0.5571, "EI3": 0.5571, "GJ": 0.4401}},
+        "nodes": {"r": {"position": [0, 0, 0], "support": "clamped"}, "t": {"position": [1, 0, 0]}},
+        "members": {"b": {"nodes": ["r", "t"], "section": "s"}},
+        "contacts": {
+            "bar": {
+                "type": "cylinder",
+                "center": [1.0292, 0.2234, 0.0472],
+                "radius": 0.0985,
+                "axis": [-0.5328, 0.7139, -0.4543],
+                "members": "all",
+            }
+        },
+        "loads": {"w": {"type": "force", "node": "t", "value": [0.0895, 0.4139, 0.1467]}},
+    }
+    many = solve(made(table | {"analysis": {"steps": [0.05 * k for k in range(1, 21)]}})).last
+    np.testing.assert_allclose(solve(made(table)).last.position("t"), many.position("t"), atol=1e-4)

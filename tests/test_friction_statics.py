@@ -1,11 +1,16 @@
 """Coulomb friction where members touch, in statics along the order of the steps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
 from sfetcas import Scene, SceneError, SolveError, cli, dump, solve
+from sfetcas.contact.gripping import CENTRED
+from sfetcas.contact.member_contact import MemberContact
+from sfetcas.mechanics.mesh import ContactPoint, Grip
 
 FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}
 TIP_FLOOR = {"type": "plane", "point": [0, -0.3], "normal": [0, 1], "members": "all"}
@@ -359,3 +364,20 @@ def test_a_heavy_rope_over_a_rough_drum_stays_though_one_end_is_longer():
     assert drum["member"] == "drum"
     # All of the weight, to rounding of what is in balance.
     np.testing.assert_allclose(drum["force"], [0.0, short + np.pi * radius + long, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize(("slope", "slides"), [(-0.5 * CENTRED, False), (-3.0 * CENTRED, True)])
+def test_with_friction_a_place_at_an_end_goes_inwards_by_more_than_it_is_known(slope, slides):
+    """It would go to where the nearest place was when it was set up, beyond the end, and come back, without an end."""
+    scene = Scene(
+        sections={"s": {"EI3": 1.0}},
+        nodes={"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        members={"b": {"nodes": ["A", "B"], "section": "s"}},
+        contacts={"floor": {"type": "plane", "point": [0, -0.1], "normal": [0, 1], "friction": 0.3, "members": "all"}},
+    )
+    own = MemberContact(scene, lambda mesh: None, 1e-6, frozenset())
+    own.closest.slopes = lambda *_: np.array([slope])
+    plain = ContactPoint("floor", ("b",), (0.0,), (False,), 0.0, normal=(0.0, 1.0, 0.0))
+    grip = Grip(0.3, 1.0, ((1.0, 0.0, 0.0),), (0.0,) * 3, ((1.0, 0.0, 0.0),), ((1.0, 0.0, 0.0),), (0.0,) * 3, 0.0)
+    assert own._freed(None, replace(plain, grip=grip), ()).slides == (slides,)
+    assert own._freed(None, plain, ()).slides == (True,)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..description.obstacles import Obstacle
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, unit
 from ..mechanics.balance import three
@@ -66,6 +67,12 @@ class Placed:
             for here, point in zip(self.places, points, strict=True)
         ]
 
+    def normal(self, i: int, stop: Obstacle | None) -> Array:
+        """Unit normal (3,) at a point, on an obstacle or on the second member."""
+        if stop is None:
+            return unit(self.vectors[i])
+        return np.asarray(stop.normals(self.places[i][0][None], self.tangents[i][0][None])[0])
+
 
 @dataclass(eq=False)
 class Gripping:
@@ -115,7 +122,7 @@ class Gripping:
         coefficient = self.scene.contacts[point.contact].friction
         if not coefficient:
             return point
-        normal, vector, apart = self._normal(point, i, now), now.vectors[i], before.vectors[i]
+        normal, vector, apart = now.normal(i, self.closest.pairs[point.pair].stop), now.vectors[i], before.vectors[i]
         if point.grip is None and not point.new:
             # Beside what touches already it has hardly moved before it touches.
             touched, share = np.zeros(3), 0.0
@@ -206,16 +213,9 @@ class Gripping:
         assert point.grip is not None
         lengths = [self.closest.lengths[member] for member in point.members]
         along = max(abs(a - b) * size for a, b, size in zip(point.at, now.at, lengths, strict=True))
-        turned = np.abs(np.array(point.grip.frame) @ self._normal(now, i, placed)).max()
+        turned = np.abs(np.array(point.grip.frame) @ placed.normal(i, self.closest.pairs[now.pair].stop)).max()
         tangents = np.abs(np.array(placed.tangents[i]) - np.array(point.grip.now)).max()
         return bool(along > CENTRED * self.scene.size or turned > CENTRED or tangents > CENTRED)
-
-    def _normal(self, point: ContactPoint, i: int, placed: Placed) -> Array:
-        """Unit normal (3,) at a point."""
-        stop = self.closest.pairs[point.pair].stop
-        if stop is None:
-            return unit(placed.vectors[i])
-        return np.asarray(stop.normals(placed.places[i][0][None], placed.tangents[i][0][None])[0])
 
 
 def _told(vector: Array) -> Vector:

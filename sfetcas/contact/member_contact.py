@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import tolerances
+from ..description.obstacles import Obstacle
 from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics.arrays import Array, Index, numbers, unit
@@ -787,6 +788,7 @@ class MemberContact:
             falling = there is not None and self.unstable(there, way(part))
             # What turns so much faster than before may have gone over to another branch.
             sudden = turned > max(SLOW, SUDDEN * pace * (part - now.part)) and pace > 0.0
+            sudden = sudden or (there is not None and self._aside(now.solved, there))
             if there is None or ((falling or sudden) and step > NARROW):
                 # What was taken for a line on the way to a state that is not taken is none.
                 step, self.lines.keys = 0.5 * (part - now.part), lines
@@ -825,6 +827,21 @@ class MemberContact:
             return None
         far = self.turned(now.fields, there.fields) > self.stride or self._swung(now, there) > SWUNG
         return None if far or self._crossings(there.fields, now.fields) else there
+
+    def _aside(self, before: Solved, after: Solved) -> bool:
+        """Whether what begins to touch a round obstacle does so far round it from where it was: it may have gone deep
+        into it on the way, where that pushes it to another side.
+        """
+        had = {point.pair for point in before.model.mesh.points}
+        begun = [p for p in points_of(after) if len(p.members) == 1 and not p.edge and p.pair not in had]
+        earlier, now = (Placed(self.scene, state.fields, begun) for state in (before, after))
+        cosines = [earlier.normal(i, stop) @ now.normal(i, stop) for i, stop in enumerate(map(self._stop, begun))]
+        return min(cosines, default=1.0) < np.cos(STRIDE)
+
+    def _stop(self, point: ContactPoint) -> Obstacle:
+        stop = self.closest.pairs[point.pair].stop
+        assert stop is not None
+        return stop
 
     def _fallen_from(self, mesh: Mesh, now: _Step, part: float, way: Way) -> Solved | None:
         """Where a state comes to rest a little further on its way, where none is near to it; None where it does not."""
