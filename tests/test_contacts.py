@@ -1019,3 +1019,21 @@ def test_a_tip_stays_on_the_side_from_which_it_comes_to_a_thin_cylinder():
     }
     many = solve(made(table | {"analysis": {"steps": [0.05 * k for k in range(1, 21)]}})).last
     np.testing.assert_allclose(solve(made(table)).last.position("t"), many.position("t"), atol=1e-4)
+
+
+def test_a_bar_does_not_swing_through_a_circle_in_a_long_step():
+    """Its tip would pass the circle and come to rest beyond it: where it was and where it is lie on one side of it."""
+    table = {
+        "gravity": [0, -3.656],
+        "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
+        "nodes": {"r": {"position": [0, 0], "support": "hinge"}, "t": {"position": [1, 0]}},
+        "members": {"b": {"nodes": ["r", "t"], "section": "s", "type": "rigid"}},
+        "springs": {"k": {"type": "rotational", "node": "r", "stiffness": 1.4232}},
+        "loads": {"w": {"type": "force", "node": "t", "value": [-0.9234, -0.9028]}},
+        "contacts": {"drum": {"type": "circle", "center": [1.2624, -0.5262], "radius": 0.5668, "members": "all"}},
+    }
+    step = solve(made(table)).last
+    # The tip is where circles of radius 1 about the hinge and 0.5668 about the center meet.
+    x, y = step.position("t")[:2]
+    np.testing.assert_allclose([np.hypot(x, y), np.hypot(x - 1.2624, y + 0.5262)], [1.0, 0.5668], atol=1e-9)
+    assert step.contacts["drum"]["at"] == 1.0

@@ -20,7 +20,7 @@ from .. import tolerances
 from ..description.obstacles import Obstacle
 from ..description.scene import Scene
 from ..errors import SceneError
-from ..mathematics.arrays import Array, Index, numbers, unit
+from ..mathematics.arrays import TINY, Array, Index, numbers, unit
 from ..mechanics.accuracy import roughness
 from ..mechanics.contact_points import undeformed_vectors
 from ..mechanics.equations import Point, State
@@ -219,8 +219,24 @@ class MemberContact:
     def unstopped(self, before: Solved, after: Solved) -> bool:
         """Whether members neither penetrate nor pass each other from one state to another."""
         self.edges.begin(before.fields)
-        near = self._swung(before, after) < SWUNG and self.clear(after.fields)
-        return near and not self.passed(before.fields, after.fields)
+        near = self._swung(before, after) < STRIDE and self.clear(after.fields)
+        return near and not (self.passed(before.fields, after.fields) or self._swept(before.fields, after.fields))
+
+    def _swept(self, before: Fields, after: Fields) -> bool:
+        """Whether places of members that move straight from one state to another come inside of a round obstacle."""
+        for pair in self.closest.pairs.values():
+            stop = pair.stop
+            if stop is None or stop.kind != "round" or stop.sign < 0.0 or pair.edge:
+                continue
+            x = self.closest.samples(after.model.mesh, pair.members[0])
+            places = (f.positions(pair.members[0], x) for f in (before, after))
+            a, b = (f.seen(pair.contact, p, p)[0] for f, p in zip((before, after), places, strict=True))
+            first, way = (a - stop.place) @ stop.across, (b - a) @ stop.across
+            size = np.maximum(np.einsum("ni,ni->n", way, way), TINY)
+            share = np.clip(-np.einsum("ni,ni->n", first, way) / size, 0.0, 1.0)
+            if (np.linalg.norm(first + share[:, None] * way, axis=1) < pair.distance - self.tolerance).any():
+                return True
+        return False
 
     @staticmethod
     def _swung(before: Solved, after: Solved) -> float:
