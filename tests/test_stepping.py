@@ -438,25 +438,6 @@ def test_complementarity_against_all_choices(count, rank, dense, monkeypatch):
     np.testing.assert_allclose(rows.T @ found, best[0], atol=1e-7)
 
 
-def test_complementarity_where_forces_are_no_energy(monkeypatch):
-    """As those of members that are nearly parallel; the interior-point method ends without a solution here."""
-    rng, count = np.random.default_rng(40), 30
-    places = np.linspace(0.0, 1.0, count)
-    right = np.stack([np.cos(k * places + rng.normal()) for k in range(8)], axis=1)
-    left = right + 0.8 * rng.normal(size=right.shape)
-    matrix, b = left @ right.T, left @ rng.normal(size=8)
-    assert np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min() < -1.0
-    found = complementary(csc_matrix(matrix), b, np.zeros(count))
-    monkeypatch.setattr(complementarity, "DENSE", 0)
-    assert complementary(csc_matrix(matrix), b, np.zeros(count)) is None
-    assert found is not None
-    opening = matrix @ found + b
-    # The small diagonal has its share, which a second solution takes back.
-    assert found.min() >= 0.0
-    assert opening.min() > -1e-5
-    assert abs(found @ opening) < 1e-4
-
-
 @pytest.mark.parametrize("directions", [1, 2])
 @pytest.mark.parametrize("start", ["newton", "rounds"])
 def test_impulses_obey_the_law_of_coulomb(directions, start, monkeypatch):

@@ -80,7 +80,7 @@ ITERATIONS, SLIDING, SLID = 40, 4, 1e-8
 little of the unit of length they move then where they have arrived.
 """
 
-SEARCHES, COPIED = 30, 1
+SEARCHES, COPIED = 30, 3
 """Searches after a step at most, and after how many of them places go on that are added."""
 
 SHORTER = 12

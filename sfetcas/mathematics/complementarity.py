@@ -5,12 +5,13 @@
 With friction further numbers ``y`` belong to one of ``x``, which may be at most ``mu x`` together, and the slips ``v``
 are further rows of ``A x + b``: ``y = - mu x v / |v|`` where ``v`` is not zero.
 
-Which forces push is mostly known from a problem like it: Newton's method on ``min(x, A x + b) = 0``, which lets all
-that is infeasible change sides at once, then ends within a few steps.  Where it does not, or nothing is known, there
-are pivots, all wrong signs at once and, where that goes round, Lemke's, which lead to a solution wherever ``A`` is of
-an energy, and mostly where it is not.  With many forces ``A`` is sparse, and an interior-point method leads to the
-solution in a number of steps that hardly grows, where it is of an energy.  Where rows depend on each other a small
-diagonal makes the solution unique.  It multiplies the change from a solution that is near, so that
+With few forces, or where what they do to each other is no energy: pivots, all wrong signs at once and, where that goes
+round, Lemke's, which lead to a solution wherever ``A`` is of an energy, and mostly where it is not.
+
+With many forces ``A`` is sparse.  Which forces push is mostly known from a problem like it: Newton's method on
+``min(x, A x + b) = 0``, which lets all that is infeasible change sides at once, then ends within a few steps.  Where it
+does not, an interior-point method leads to the solution in a number of steps that hardly grows.  Where rows depend on
+each other a small diagonal makes the solution unique.  It multiplies the change from a solution that is near, so that
 it has no part in where a sequence of such solutions ends.
 
 Coulomb's law is that ``y`` is the nearest to ``y - v`` that is allowed.  Newton's method for this equation begins with
@@ -138,12 +139,8 @@ def complementary(matrix: Sparse, b: Array, near: Array, friction: Friction | No
 
 def _smooth(matrix: Sparse, b: Array, begin: Array, least: float) -> Array | None:
     """The solution without friction."""
-    if len(b) > DENSE:
-        x = _by_newton(matrix, b, begin, least)
-        return _from_inside(matrix, b, least) if x is None else x
-    dense = matrix.toarray()
-    x = _by_newton(dense, b, begin, least)
-    return by_pivots(dense, b) if x is None else x
+    x = _by_newton(matrix.toarray() if len(b) <= DENSE else matrix, b, begin, least)
+    return _from_inside(matrix, b, least) if x is None else x
 
 
 def by_pivots(matrix: Array, b: Array) -> Array | None:
