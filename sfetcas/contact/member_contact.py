@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import tolerances
-from ..description.obstacles import Obstacle
 from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics.arrays import TINY, Array, Index, numbers, unit
@@ -226,7 +225,7 @@ class MemberContact:
         """Whether places of members that move straight from one state to another come inside of a round obstacle."""
         for pair in self.closest.pairs.values():
             stop = pair.stop
-            if stop is None or stop.kind != "round" or stop.sign < 0.0 or pair.edge:
+            if stop is None or pair.edge or not pair.passable:
                 continue
             x = self.closest.samples(after.model.mesh, pair.members[0])
             places = (f.positions(pair.members[0], x) for f in (before, after))
@@ -851,13 +850,9 @@ class MemberContact:
         had = {point.pair for point in before.model.mesh.points}
         begun = [p for p in points_of(after) if len(p.members) == 1 and not p.edge and p.pair not in had]
         earlier, now = (Placed(self.scene, state.fields, begun) for state in (before, after))
-        cosines = [earlier.normal(i, stop) @ now.normal(i, stop) for i, stop in enumerate(map(self._stop, begun))]
+        stops = (self.closest.pairs[point.pair].stop for point in begun)
+        cosines = [earlier.normal(i, stop) @ now.normal(i, stop) for i, stop in enumerate(stops)]
         return min(cosines, default=1.0) < np.cos(STRIDE)
-
-    def _stop(self, point: ContactPoint) -> Obstacle:
-        stop = self.closest.pairs[point.pair].stop
-        assert stop is not None
-        return stop
 
     def _fallen_from(self, mesh: Mesh, now: _Step, part: float, way: Way) -> Solved | None:
         """Where a state comes to rest a little further on its way, where none is near to it; None where it does not."""
