@@ -62,6 +62,14 @@ def test_rows_that_depend_on_each_other_have_a_solution(seed):
     assert abs(x @ rest) < 1e-9
 
 
+def test_of_two_solutions_the_one_to_which_the_change_leads_is_found():
+    """What the second force yields to grows with itself: the gap there may stay open, or be closed by a push."""
+    matrix, given = np.array([[1.0, 0.0], [3.0, -1.0]]), np.array([-1.0, -1.0])
+    np.testing.assert_allclose(by_pivots(matrix, given), [1.0, 2.0], rtol=1e-14)
+    # From where both gaps are open the first force grows by s, and leaves 1 - 2 s + 3 s of the other gap.
+    np.testing.assert_allclose(by_pivots(matrix, given, np.array([0.0, 1.0])), [1.0, 0.0], rtol=1e-14)
+
+
 def test_what_has_no_solution_is_told():
     assert by_pivots(np.array([[-1.0]]), np.array([-1.0])) is None
 

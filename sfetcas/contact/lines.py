@@ -264,13 +264,14 @@ class Lines:
 
     # -- from points to lines and back ------------------------------------------------------------
 
-    def lengthened(self, found: Solved, least: int = LINE) -> tuple[Mesh, Points] | None:
+    def lengthened(self, found: Solved, points: Points, least: int = LINE) -> tuple[Mesh, Points] | None:
         """Mesh and points where a pair that touches at so many places is a line from now on; None for none.
+
+        ``points`` are those of the state, or those with which none was found near it.
 
         Members that touch each other become one where they are as near between the places, and with ``SHORT_LINE``
         alone: where these cannot slide.
         """
-        points = points_of(found)
         for key, pair in self.closest.pairs.items():
             own = [p for p in points if p.pair == key and beside_ends(p)]
             if not own or pair.edge or not self.bends(pair.members[0]):

@@ -108,6 +108,12 @@ BETWEEN = 0.1
 elements are divided on the way: else they pass each other there.
 """
 
+WITHIN = 1e-3
+"""Depth, over the size, to which members that lie along an obstacle may be inside of it between ends of elements in a
+step of the way: pressure that is linear along coarse elements leaves some 2e-4, an element in which a line ends and no
+place slides some 5e-3.
+"""
+
 NUDGE = 0.02
 """Rotation, rad, by which an unstable state is moved along its unstable mode."""
 
@@ -553,6 +559,7 @@ class MemberContact:
     def _resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float, ends: bool) -> Solved | None:
         tried: set[object] = set()
         since, solved, several, least = source, False, False, LINE
+        flat: Points = ()
         self.edges.begin(source.fields)
         careful, alone, short = False, set[object](), set[PairKey]()
         for _ in range(ROUNDS // 3 if ends else ROUNDS):
@@ -565,10 +572,12 @@ class MemberContact:
                     careful, found = True, source
                 elif solved and least > SHORT_LINE:
                     # Places between which a member is flat may slide anywhere there.
-                    least, found = SHORT_LINE, source
+                    flat = points if careful else ()
+                    least, found, careful = SHORT_LINE, source, False
                 else:
                     return None
-            lined = None if careful else self.lines.lengthened(found, least)
+            lined = None if careful else self.lines.lengthened(found, flat or points_of(found), least)
+            flat = ()
             parted = None if careful or lined else self.lines.parted(found, self.tolerance, np.inf, short)
             if parted is not None:
                 lined = parted[:2]
@@ -838,10 +847,17 @@ class MemberContact:
             # Members thinner than the step is long touch where they were nearest before.
             there = self.resolved(mesh, (*points, *map(begun, crossings)), now, way)
             crossings = [] if there is None else self._crossings(now.fields, there.fields)
-        if there is None or crossings:
+        if there is None or crossings or self._within(there) > WITHIN * self.scene.size:
             return None
         far = self.turned(now.fields, there.fields) > self.stride or self._swung(now, there) > SWUNG
         return None if far or self._crossings(there.fields, now.fields) else there
+
+    def _within(self, found: Solved) -> float:
+        """How deep members are inside of obstacles along which they lie at most, m, where it is solved for where lines
+        end.
+        """
+        lined = [self.closest.pairs[key] for key in sorted(self.lines.keys) if self.lines.chosen(key)]
+        return max((-near.gap for near in self.closest.found(found.fields, 0.0, lined)), default=0.0)
 
     def _aside(self, before: Solved, after: Solved) -> bool:
         """Whether what begins to touch a round obstacle does so far round it from where it was: it may have gone deep

@@ -5,8 +5,10 @@
 With friction further numbers ``y`` belong to one of ``x``, which may be at most ``mu x`` together, and the slips ``v``
 are further rows of ``A x + b``: ``y = - mu x v / |v|`` where ``v`` is not zero.
 
-With few forces, or where what they do to each other is no energy: pivots, all wrong signs at once and, where that goes
-round, Lemke's, which lead to a solution wherever ``A`` is of an energy, and mostly where it is not.
+With few forces, or where what they do to each other is no energy: pivots.  Where it is known from where ``b`` has come
+they follow its change: of several solutions, as of a strip that lies on a floor and is pressed along it, that is the
+one that goes on.  Else all wrong signs at once and, where that goes round, Lemke's, which lead to a solution wherever
+``A`` is of an energy, and mostly where it is not.
 
 With many forces ``A`` is sparse.  Which forces push is mostly known from a problem like it: Newton's method on
 ``min(x, A x + b) = 0``, which lets all that is infeasible change sides at once, then ends within a few steps.  Where it
@@ -19,9 +21,10 @@ the solution of a problem like it, or with the one without friction; where it do
 is solved by itself for some rounds before it is tried again.
 
 Source: Lemke 1965 (pivots); Judice and Pires 1994 (blocks of them); Cottle, Pang and Stone 2009, The Linear
-Complementarity Problem, sections 4.4 and 4.9; Kojima, Megiddo, Noma and Yoshise 1991, A unified approach to interior
-point algorithms for linear complementarity problems; Mehrotra 1992 (doi 10.1137/0802028); Rockafellar 1976 (proximal
-point); Alart and Curnier 1991 (friction as an equation); Jean 1999, The non-smooth contact dynamics method (rounds).
+Complementarity Problem, sections 4.4, 4.5 (along a change) and 4.9; Kojima, Megiddo, Noma and Yoshise 1991, A unified
+approach to interior point algorithms for linear complementarity problems; Mehrotra 1992 (doi 10.1137/0802028);
+Rockafellar 1976 (proximal point); Alart and Curnier 1991 (friction as an equation); Jean 1999, The non-smooth contact
+dynamics method (rounds).
 """
 
 from __future__ import annotations
@@ -49,9 +52,9 @@ FEW, MOST = 15, 100
 DENSE = 400
 """Numbers of a problem up to which a dense matrix is faster than a sparse one."""
 
-BLOCKS, PIVOTS = 8, 10
+BLOCKS, PIVOTS, ALONG = 8, 10, 2
 """Block pivots without fewer wrong signs, after which single ones follow; of these at most as many over the number of
-rows.
+rows, and along a change of ``b``.
 """
 
 BALANCED = 4
@@ -143,8 +146,11 @@ def _smooth(matrix: Sparse, b: Array, begin: Array, least: float) -> Array | Non
     return _from_inside(matrix, b, least) if x is None else x
 
 
-def by_pivots(matrix: Array, b: Array) -> Array | None:
+def by_pivots(matrix: Array, b: Array, begin: Array | None = None) -> Array | None:
     """The solution x (n,) of a problem with a dense matrix (n, n); None where pivots lead to none that is accurate.
+
+    ``begin`` (n,), not negative, is where ``b`` has come from: there ``x`` is zero.  Where there are several solutions
+    the one is found to which the change of ``b`` leads from there.
 
     Examples
     --------
@@ -152,6 +158,12 @@ def by_pivots(matrix: Array, b: Array) -> Array | None:
     [1.0, 0.0]
     """
     try:
+        if begin is not None:
+            found = _by_single_pivots(matrix, b, begin - b, ALONG)
+            if found is not None:
+                x, wrong = _tried(matrix, b, found)
+                if not wrong.any():
+                    return x
         return _by_pivots(matrix, b)
     except np.linalg.LinAlgError:
         return None
@@ -185,22 +197,29 @@ def _tried(matrix: Array, b: Array, chosen: Array) -> tuple[Array, Array]:
     return np.maximum(x, 0.0), np.where(chosen, x, rest) < -ROUNDING * size
 
 
-def _by_single_pivots(matrix: Array, b: Array) -> Array | None:
-    """Which numbers (n,) are not zero, by Lemke's pivots; None where they lead to no solution."""
+def _by_single_pivots(matrix: Array, b: Array, back: Array | None = None, pivots: int = PIVOTS) -> Array | None:
+    """Which numbers (n,) are not zero, by Lemke's pivots; None where they lead to no solution.
+
+    Of ``b + share back`` (n,), with the least share from which on nothing of it is negative, zero is the solution; from
+    there the share falls to zero.  Without ``back`` all rows are alike in their units.
+    """
     n, unit = len(b), np.ones(len(b))
     # Of rows of different units each has one in which its largest number is about one.
     for _ in range(BALANCED):
         largest = np.abs(unit[:, None] * matrix * unit).max(axis=1, initial=0.0)
         unit /= np.sqrt(np.where(largest > 0.0, largest, 1.0))
-    table = np.column_stack([np.eye(n), -unit[:, None] * matrix * unit, -np.ones(n), unit * b])
-    basis, out, enters = np.arange(n), int(np.argmin(table[:, -1])), 2 * n
+    back = np.ones(n) if back is None else unit * back
+    table = np.column_stack([np.eye(n), -unit[:, None] * matrix * unit, -back, unit * b])
     size = np.abs(table[:, -1]).max(initial=0.0)
-    if table[out, -1] >= 0.0:
+    low = np.flatnonzero(b < 0.0)
+    if not len(low):
         return np.zeros(n, bool)
-    for _ in range(PIVOTS * n):
+    basis, out, enters = np.arange(n), int(low[np.argmax(-table[low, -1] / back[low])]), 2 * n
+    for _ in range(pivots * n):
         table[out] /= table[out, enters]
-        others = np.arange(n) != out
-        table[others] -= np.outer(table[others, enters], table[out])
+        taken = table[:, enters].copy()
+        taken[out] = 0.0
+        table -= taken[:, None] * table[out]
         left, basis[out] = int(basis[out]), enters
         if left == 2 * n:
             return np.isin(np.arange(n), basis[basis >= n] - n)

@@ -125,7 +125,9 @@ class OneSided(AtLoads):
         gaps, pushes = -signs[:, None] * gaps, signs[:, None] * moved[rows]
         pushes[:, 0] += forces
         basic = np.where(self.acting[:, None], pushes, gaps)
-        found = by_pivots(basic[:, 1:], basic[:, 0])
+        now = np.maximum(np.where(self.acting, forces, -signs * point.residual[rows]), 0.0)
+        # Where pushes are unknowns what slips changes with them, which is not part of the choice of rows.
+        found = by_pivots(basic[:, 1:], basic[:, 0], now if (signs < 0.0).all() else None)
         if found is not None:
             self.acting[found > 0.0] ^= True
         if here.residual <= AGAIN:
