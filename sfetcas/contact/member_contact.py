@@ -122,6 +122,9 @@ FALLS, DRAGS, BEYOND, SLOW, STILL = 80, (1.0, 1e-11, 1e6), 4.0, 0.1, 1e-5
 below which it is looked whether it has come to rest, and below which it has, though it may be unstable there.
 """
 
+TOLD = 0.05
+"""Rotation of a fall, rad, from which on it is told: it is of a step in which what is followed turns by a hundredth."""
+
 MOST_FALLS = 12
 """Unstable states on a way that are left, and ends of branches, at most."""
 
@@ -878,8 +881,10 @@ class MemberContact:
         rest = None if rest is None else self._refined(rest, way)
         if rest is None or rest.negative > 0:
             return None
-        if self.turned(now.solved.fields, rest.fields) > self.stride or self.passed(now.solved.fields, rest.fields):
+        turned = self.turned(now.solved.fields, rest.fields)
+        if turned > self.stride or self.passed(now.solved.fields, rest.fields):
             self.falls += 1
+        if turned > TOLD:
             self.jumps.append((part, ENDED))
         return rest
 

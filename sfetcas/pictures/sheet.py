@@ -335,6 +335,10 @@ def _arrow(points: Array, mark: Mark, style: dict[str, Any]) -> FancyArrowPatch:
     return FancyArrowPatch(path=Outline(points), fill=True, **look, **style)
 
 
+UNSEEN = 0.5
+"""Change of a layout, pixels, that nobody sees."""
+
+
 @dataclass(eq=False)
 class Sheet:
     """A figure with its axes, the same where marks are drawn on, and what is to be drawn; ``drawn``: its marks."""
@@ -371,14 +375,20 @@ class Sheet:
             for _ in range(2):
                 for _ in range(4):
                     self._fit()
+                laid = np.array(self.axes.get_window_extent().extents)
                 self.figure.draw_without_rendering()
+                if np.abs(np.array(self.axes.get_window_extent().extents) - laid).max() < UNSEEN:
+                    break
             return
         # Ticks in space stand where they were drawn last; what else is laid out they do not change.
         layout = self.figure.get_layout_engine()
         self.figure.set_layout_engine("none")
         for _ in range(6):
+            before = self._content()
             self._fit()
             self.figure.draw_without_rendering()
+            if np.abs(self._content() - before).max() < UNSEEN:
+                break
         self.figure.set_layout_engine(layout)
 
     def _tell_left_out(self, count: int) -> None:
