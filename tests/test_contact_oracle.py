@@ -147,3 +147,10 @@ def test_a_line_that_begins_within_a_long_element_is_seen():
         # As scenes at random are judged; it was fifteen times as far from there.
         apart = np.abs(step.along(name, QUARTERS)["position"] - places).max() / chain.size
         assert apart < APART + chain.error
+
+
+def test_a_fall_by_a_few_degrees_is_told():
+    """The chain snaps there; what was left turns by 0.08 rad, no more than what is followed may in a step."""
+    (note,) = solve(Scene.from_dict(contact_scene("floors", 116))).last.notes
+    assert note.startswith("jumped")
+    assert chain_contact(contact_scene("floors", 116)).snapped

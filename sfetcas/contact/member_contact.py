@@ -11,7 +11,7 @@ The loads are followed from zero in steps so short that no member passes through
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,7 +39,7 @@ from .closest import Closest
 from .edges import Edges
 from .gripping import CENTRED, FIRM, Gripping, Placed
 from .lines import LINE, SHORT_LINE, Lines, Points, begun, ends_of, points_of
-from .pairs import ONE, Near, PairKey
+from .pairs import ONE, Near, Pair, PairKey
 
 __all__ = ["FITS", "MemberContact", "Way"]
 
@@ -123,7 +123,9 @@ below which it is looked whether it has come to rest, and below which it has, th
 """
 
 TOLD = 0.05
-"""Rotation of a fall, rad, from which on it is told: it is of a step in which what is followed turns by a hundredth."""
+"""Rotation, rad, from which on a fall is told where no equilibrium was near; in so short a step a state that goes on
+turns by less than a fifth of that.
+"""
 
 MOST_FALLS = 12
 """Unstable states on a way that are left, and ends of branches, at most."""
@@ -220,9 +222,11 @@ class MemberContact:
         """Whether no members penetrate each other."""
         return self.penetration(fields) <= self.tolerance
 
-    def penetration(self, fields: Fields) -> float:
-        """How deep members penetrate each other at most, m: between the places of a line, where nothing stops them."""
-        return max((-near.gap for near in self.closest.found(fields, 0.0)), default=0.0)
+    def penetration(self, fields: Fields, pairs: Sequence[Pair] | None = None) -> float:
+        """How deep members of given pairs, or of all, are in what they touch at most, m: between the places of a line,
+        where nothing stops them.
+        """
+        return max((-near.gap for near in self.closest.found(fields, 0.0, pairs)), default=0.0)
 
     def unstopped(self, before: Solved, after: Solved) -> bool:
         """Whether members neither penetrate nor pass each other from one state to another."""
@@ -562,10 +566,10 @@ class MemberContact:
     def _resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float, ends: bool) -> Solved | None:
         tried: set[object] = set()
         since, solved, several, least = source, False, False, LINE
-        flat: Points = ()
         self.edges.begin(source.fields)
         careful, alone, short = False, set[object](), set[PairKey]()
         for _ in range(ROUNDS // 3 if ends else ROUNDS):
+            flat: Points = ()
             found = self.solved(mesh, points, source, way, since if drag else None, drag, ends)
             if found is None and ends:
                 return None
@@ -580,7 +584,6 @@ class MemberContact:
                 else:
                     return None
             lined = None if careful else self.lines.lengthened(found, flat or points_of(found), least)
-            flat = ()
             parted = None if careful or lined else self.lines.parted(found, self.tolerance, np.inf, short)
             if parted is not None:
                 lined = parted[:2]
@@ -850,17 +853,13 @@ class MemberContact:
             # Members thinner than the step is long touch where they were nearest before.
             there = self.resolved(mesh, (*points, *map(begun, crossings)), now, way)
             crossings = [] if there is None else self._crossings(now.fields, there.fields)
-        if there is None or crossings or self._within(there) > WITHIN * self.scene.size:
+        if there is None or crossings:
+            return None
+        lined = [self.closest.pairs[key] for key in sorted(self.lines.keys) if self.lines.chosen(key)]
+        if self.penetration(there.fields, lined) > WITHIN * self.scene.size:
             return None
         far = self.turned(now.fields, there.fields) > self.stride or self._swung(now, there) > SWUNG
         return None if far or self._crossings(there.fields, now.fields) else there
-
-    def _within(self, found: Solved) -> float:
-        """How deep members are inside of obstacles along which they lie at most, m, where it is solved for where lines
-        end.
-        """
-        lined = [self.closest.pairs[key] for key in sorted(self.lines.keys) if self.lines.chosen(key)]
-        return max((-near.gap for near in self.closest.found(found.fields, 0.0, lined)), default=0.0)
 
     def _aside(self, before: Solved, after: Solved) -> bool:
         """Whether what begins to touch a round obstacle does so far round it from where it was: it may have gone deep
@@ -882,9 +881,9 @@ class MemberContact:
         if rest is None or rest.negative > 0:
             return None
         turned = self.turned(now.solved.fields, rest.fields)
-        if turned > self.stride or self.passed(now.solved.fields, rest.fields):
-            self.falls += 1
-        if turned > TOLD:
+        far = turned > self.stride or self.passed(now.solved.fields, rest.fields)
+        self.falls += far
+        if far or turned > TOLD:
             self.jumps.append((part, ENDED))
         return rest
 

@@ -158,18 +158,14 @@ def by_pivots(matrix: Array, b: Array, begin: Array | None = None) -> Array | No
     [1.0, 0.0]
     """
     try:
-        if begin is not None:
-            found = _by_single_pivots(matrix, b, begin - b, ALONG)
-            if found is not None:
-                x, wrong = _tried(matrix, b, found)
-                if not wrong.any():
-                    return x
-        return _by_pivots(matrix, b)
+        x = None if begin is None else _judged(matrix, b, _by_single_pivots(matrix, b, begin - b, ALONG))
+        return _by_blocks(matrix, b) if x is None else x
     except np.linalg.LinAlgError:
         return None
 
 
-def _by_pivots(matrix: Array, b: Array) -> Array | None:
+def _by_blocks(matrix: Array, b: Array) -> Array | None:
+    """All wrong signs at once and, where that goes round, Lemke's pivots."""
     chosen, best, blocks = np.zeros(len(b), bool), len(b) + 1, BLOCKS
     while blocks:
         x, wrong = _tried(matrix, b, chosen)
@@ -179,10 +175,14 @@ def _by_pivots(matrix: Array, b: Array) -> Array | None:
         blocks = BLOCKS if count < best else blocks - 1
         best = min(best, count)
         chosen = chosen ^ wrong
-    found = _by_single_pivots(matrix, b)
-    if found is None:
+    return _judged(matrix, b, _by_single_pivots(matrix, b))
+
+
+def _judged(matrix: Array, b: Array, chosen: Array | None) -> Array | None:
+    """The solution (n,) of which only chosen numbers may differ from zero; None where there is none."""
+    if chosen is None:
         return None
-    x, wrong = _tried(matrix, b, found)
+    x, wrong = _tried(matrix, b, chosen)
     return None if wrong.any() else x
 
 

@@ -166,6 +166,9 @@ def name_upright(axes: Axes, text: str) -> None:
     axes.set_ylabel("\n".join(lines), parse_math=False, fontsize=FONT)
 
 
+UNSEEN = 0.5
+"""Change of a layout, pixels, that nobody sees."""
+
 NO_FRAME = 0.6
 """Inch of the height of a panel that its frame does not have."""
 
@@ -333,10 +336,6 @@ def _arrow(points: Array, mark: Mark, style: dict[str, Any]) -> FancyArrowPatch:
     }
     look |= {"linewidth": mark.width, "linestyle": ":" if mark.dotted else "-", "joinstyle": "miter"}
     return FancyArrowPatch(path=Outline(points), fill=True, **look, **style)
-
-
-UNSEEN = 0.5
-"""Change of a layout, pixels, that nobody sees."""
 
 
 @dataclass(eq=False)
