@@ -1,5 +1,7 @@
 """Rows that push one way only: which of them act, and lines on obstacles, where that is solved for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_points_on_obstacles import FLOOR, LARGER, cantilever, smaller
@@ -9,7 +11,7 @@ from sfetcas.mathematics.complementarity import by_pivots
 from sfetcas.solvers.arclength import Curve, Tangent, bordered
 from sfetcas.solvers.between_states import turned_between
 from sfetcas.solvers.newton import correct
-from sfetcas.solvers.one_sided import OneSided
+from sfetcas.solvers.one_sided import IN_VAIN, OneSided
 from sfetcas.solvers.prepared import Prepared
 
 
@@ -116,6 +118,22 @@ def test_line_that_grows_and_shrinks_has_the_force_of_its_length():
     np.testing.assert_allclose(held, [4.0 * step.factor for step in steps], rtol=1e-9)
     # What has been lifted lies down where it lay: without friction the way does not matter.
     np.testing.assert_allclose(ups[0], ups[2], rtol=1e-6)
+
+
+def test_where_again_and_again_no_rows_may_act_nothing_is_near(monkeypatch):
+    """Each step costs as much as one that leads somewhere, and there were thirty of them."""
+    loads = {"w": {"type": "distributed", "member": "beam", "value": [0, -40.0]}}
+    step = solve(cantilever(smaller({**FLOOR, "point": [0, -0.1]}), loads=loads)).last
+    prepared = Prepared(step.model)
+    equations, state = prepared.equations, step.fields.state
+    # Moved by far more than what suffices without a choice.
+    state = replace(state, y=state.y + 1e-3)
+    rows = np.arange(equations.unknowns, equations.total)[-2:]
+    tried = []
+    monkeypatch.setattr("sfetcas.solvers.one_sided.by_pivots", lambda *problem: tried.append(problem))
+    system = OneSided(equations, prepared.model.loading(1.0), prepared.weight, pushing=rows, acting=np.ones(2, bool))
+    assert not correct(system, state).converged
+    assert len(tried) == IN_VAIN
 
 
 def test_with_an_unknown_factor_the_solution_is_across_a_direction():

@@ -353,9 +353,9 @@ class MemberContact:
         rubs = self._rubbing(prepared, every)
         if not found.converged and len(rubs):
             # From where friction has not changed yet.
-            known = replace(system, acting=acting, still=rubs, _tried={})
+            known = replace(system, acting=acting, still=rubs, _past=[])
             found = self._by_newton(known, state, source.factor)
-            system = replace(known, still=system.still, _tried={})
+            system = replace(known, still=system.still, _past=[])
             found = self._by_newton(system, found.state, found.loading.factor) if found.converged else found
         if not found.converged:
             return None

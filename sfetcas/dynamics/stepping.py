@@ -80,8 +80,13 @@ ITERATIONS, SLIDING, SLID = 40, 4, 1e-8
 little of the unit of length they move then where they have arrived.
 """
 
-SEARCHES, COPIED = 30, 3
-"""Searches after a step at most, and after how many of them places go on that are added."""
+SEARCHES, SPREAD = 30, (-0.5, -0.25, 0.25, 0.5, 0.75)
+"""Searches after a step at most, and where places are added beside one that is found there: shares of the way from it
+to the nearest one of the same two members that was looked at.
+"""
+
+NEAREST = 4
+"""Steps of Newton's method to the place on the second member that is nearest to one that is added on the first."""
 
 SHORTER = 12
 """How often a step is halved at most."""
@@ -247,16 +252,14 @@ class Stepping(Integrator):
         places = touching.nearby.found(pose.curve, reach)
         near = Near(places, np.flatnonzero(touching.on_obstacles(pose) < reach))
         end: _End | None = _End(ahead, x, pose, near, np.zeros((len(near), self._axes)), near)
-        for search in range(SEARCHES):
+        for _ in range(SEARCHES):
             end = None if end is None else self._pushed(course, end)
             if end is None or self._farthest(end.x - begin.x) > 2.0 * longest:
                 return None
             more, missing = self._penetrating(end)
             if not len(more) and not len(missing):
                 return self._impelled(course, end)
-            # It stays where it is; at first a copy of it also goes on to where the distance is least.  Were all to go
-            # on, they would follow each other where members are nearly parallel.
-            more = more.fixed().with_more(more) if search < COPIED else more.fixed()
+            more = self._spread(end, more)
             count, nothing = len(end.near.places), np.zeros((len(more) + len(missing), self._axes))
             parts = end.forces[:count], nothing[: len(more)], end.forces[count:], nothing[len(more) :]
             near = Near(end.near.places.fixed().with_more(more), np.concatenate([end.near.spots, missing]))
@@ -293,6 +296,26 @@ class Stepping(Integrator):
         deep = touching.nearby.gaps(end.pose.curve, found) < -PENETRATION * 0.5 * touching.nearby.distance[found.pairs]
         inside = np.flatnonzero(touching.on_obstacles(end.pose) < -INSIDE)
         return found.chosen(deep), np.setdiff1d(inside, end.near.spots)
+
+    def _spread(self, end: _End, more: Places) -> Places:
+        """Places that are added for those that penetrate: these, and more beside them, as members that are nearly
+        parallel turn about each place at which one pushes.  All stay where they are: were they to go on to where the
+        distance is least, they would follow each other.
+        """
+        own, lines, found = end.near.places, self._touching.lines, more.fixed()
+        if not len(own) or not len(more):
+            return found
+        ways = [lines.lengths(y) - lines.lengths(x)[:, None] for x, y in ((more.one, own.one), (more.other, own.other))]
+        far = np.where(more.pairs[:, None] == own.pairs, np.abs(ways[0]) + np.abs(ways[1]), np.inf)
+        nearest = np.argmin(far, axis=1)
+        beside = np.flatnonzero(np.isfinite(far[np.arange(len(more)), nearest]))
+        some, ways = more.chosen(beside), [way[beside, nearest[beside]] for way in ways]
+        for share in SPREAD:
+            ends = (lines.moved(x, share * way) for x, way in zip((some.one, some.other), ways, strict=True))
+            there = Places(some.pairs, *ends, np.ones(len(some), np.intp))
+            there = self._touching.nearby.nearest(end.pose.curve, there, NEAREST, CLOSE)
+            found = found.with_more(there.chosen(self._touching.nearby.apart(there)).fixed())
+        return found
 
     def _pushed(self, course: _Course, end: _End) -> _End | None:
         """The end of a step at which nothing penetrates at given places, by Newton's method from there; None where that

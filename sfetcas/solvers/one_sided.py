@@ -21,10 +21,13 @@ from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
 from .newton import AtLoads, Balance
 
-__all__ = ["LASTING", "Border", "OneSided"]
+__all__ = ["IN_VAIN", "LASTING", "Border", "OneSided"]
 
 AGAIN, TIMES = 1e-8, 2
 """Relative residual from which on a choice that was made so many times is taken: others differ from it by rounding."""
+
+IN_VAIN = 3
+"""Steps one after the other in which no choice of rows is right, after which no solution is taken to be near."""
 
 ROUNDING = 1e-11
 """Share of the largest gap, and of the largest push, up to which a wrong sign is rounding."""
@@ -75,7 +78,7 @@ class OneSided(AtLoads):
     acting: Array = field(default_factory=lambda: np.zeros(0, bool))
     still: Index = field(default_factory=lambda: np.zeros(0, np.intp))
     border: Border | None = None
-    _tried: dict[bytes, int] = field(default_factory=dict)
+    _past: list[tuple[bytes, bool]] = field(default_factory=list)
 
     def loading(self, factor: float) -> Loading:
         """The given loads, or those at the factor where that is an unknown."""
@@ -130,9 +133,10 @@ class OneSided(AtLoads):
         found = by_pivots(basic[:, 1:], basic[:, 0], now if (signs < 0.0).all() else None)
         if found is not None:
             self.acting[found > 0.0] ^= True
-        if here.residual <= AGAIN:
-            chosen = self.acting.tobytes()
-            self._tried[chosen] = self._tried.get(chosen, 0) + 1
+        near = here.residual <= AGAIN
+        self._past.append((self.acting.tobytes() if near else b"", found is not None))
+        if not near and len(self._past) >= IN_VAIN and not any(known for _, known in self._past[-IN_VAIN:]):
+            raise np.linalg.LinAlgError("again and again no choice of rows is right")
         if found is None:
             return self._with_factor(moved[:, 0], factor[0])
         shares = np.append(1.0, found)
@@ -174,7 +178,8 @@ class OneSided(AtLoads):
 
     def suffices(self, here: Balance) -> bool:
         """Whether choices come again and again that differ by rounding."""
-        return here.residual <= AGAIN and max(self._tried.values(), default=0) > TIMES
+        close = [chosen for chosen, _ in self._past if chosen]
+        return here.residual <= AGAIN and max(map(close.count, close), default=0) > TIMES
 
     @property
     def complete(self) -> bool:
