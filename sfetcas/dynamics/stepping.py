@@ -94,6 +94,9 @@ SHORTER = 12
 CONVERGED = 1e-9
 """Change, rad or unit of length, at which Newton's method ends, with one more iteration."""
 
+ENOUGH = 1e-6
+"""Change, rad or unit of length, from which on it is seen where places are to be added."""
+
 FRESH = 1e-5
 """Change, rad or unit of length, up to which the next iteration has the same factors."""
 
@@ -252,13 +255,17 @@ class Stepping(Integrator):
         places = touching.nearby.found(pose.curve, reach)
         near = Near(places, np.flatnonzero(touching.on_obstacles(pose) < reach))
         end: _End | None = _End(ahead, x, pose, near, np.zeros((len(near), self._axes)), near)
+        closely = False
         for _ in range(SEARCHES):
-            end = None if end is None else self._pushed(course, end)
+            end = None if end is None else self._pushed(course, end, closely)
             if end is None or self._farthest(end.x - begin.x) > 2.0 * longest:
                 return None
             more, missing = self._penetrating(end)
             if not len(more) and not len(missing):
-                return self._impelled(course, end)
+                if closely:
+                    return self._impelled(course, end)
+                closely = True
+                continue
             more = self._spread(end, more)
             count, nothing = len(end.near.places), np.zeros((len(more) + len(missing), self._axes))
             parts = end.forces[:count], nothing[: len(more)], end.forces[count:], nothing[len(more) :]
@@ -311,15 +318,15 @@ class Stepping(Integrator):
         beside = np.flatnonzero(np.isfinite(far[np.arange(len(more)), nearest]))
         some, ways = more.chosen(beside), [way[beside, nearest[beside]] for way in ways]
         for share in SPREAD:
-            ends = (lines.moved(x, share * way) for x, way in zip((some.one, some.other), ways, strict=True))
-            there = Places(some.pairs, *ends, np.ones(len(some), np.intp))
+            one, other = (lines.moved(x, share * way) for x, way in zip((some.one, some.other), ways, strict=True))
+            there = Places(some.pairs, one, other, np.ones(len(some), np.intp))
             there = self._touching.nearby.nearest(end.pose.curve, there, NEAREST, CLOSE)
             found = found.with_more(there.chosen(self._touching.nearby.apart(there)).fixed())
         return found
 
-    def _pushed(self, course: _Course, end: _End) -> _End | None:
-        """The end of a step at which nothing penetrates at given places, by Newton's method from there; None where that
-        does not converge.
+    def _pushed(self, course: _Course, end: _End, closely: bool) -> _End | None:
+        """The end of a step at which nothing penetrates at given places, by Newton's method from there, nearly so where
+        other places may be added; None where that does not converge.
         """
         equations, unknowns, moved, last = self._equations, self.system.equations.unknowns, 0.0, False
         order, back = equations.order, np.argsort(equations.order)
@@ -361,7 +368,7 @@ class Stepping(Integrator):
             moved = float(np.abs(step[:unknowns]).max(initial=0.0))
             if not moved < FAR:
                 return None
-            if last:
+            if last or not (closely or slides or moved > ENOUGH):
                 x = equations.quantities(state, course.factors[1])
                 return _End(state, x, self._pose(state, x), near, forces, acting, factors)
             # Rounding may leave more than that, which falls no further.

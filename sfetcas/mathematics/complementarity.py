@@ -37,7 +37,7 @@ from .arrays import TINY, Array, Index, Sparse
 
 __all__ = ["Friction", "by_pivots", "complementary"]
 
-YIELDING = 1e-7
+YIELDING = 1e-9
 """Diagonal that is added, over the one that is there."""
 
 NOTHING = 1e-11
