@@ -117,7 +117,7 @@ place slides some 5e-3.
 NUDGE = 0.02
 """Rotation, rad, by which an unstable state is moved along its unstable mode."""
 
-FALLS, DRAGS, BEYOND, SLOW, STILL = 80, (1.0, 1e-11, 1e6), 4.0, 0.1, 1e-5
+FALLS, DRAGS, BEYOND, SLOW, STILL = 80, (1.0, 1e-11, 1e6), 1.5, 0.1, 1e-5
 """Steps of a fall at most; first, least and largest drag; drag over what makes a step unique; rotation in a step, rad,
 below which it is looked whether it has come to rest, and below which it has, though it may be unstable there.
 """
