@@ -171,6 +171,8 @@ def contact(arguments: Sequence[str] = ()) -> None:
     parser.add_argument("--family", choices=FAMILIES)
     parser.add_argument("--save", type=Path, help="folder for the scenes that are not right")
     asked = parser.parse_args(arguments)
+    if asked.save:
+        asked.save.mkdir(parents=True, exist_ok=True)
     worker, outcomes = Worker(10.0 * asked.seconds), []
     families = [asked.family] if asked.family else list(FAMILIES)
     try:

@@ -141,6 +141,8 @@ def members(arguments: Sequence[str] = ()) -> None:
     parser.add_argument("--kind", choices=list(KINDS))
     parser.add_argument("--save", type=Path, help="folder for the scenes that are not solved")
     asked = parser.parse_args(arguments)
+    if asked.save:
+        asked.save.mkdir(parents=True, exist_ok=True)
     worker, outcomes = Worker(3.0 * asked.seconds + 120.0), list[MemberOutcome]()
     try:
         for seed in range(asked.first, asked.first + asked.count):

@@ -426,12 +426,14 @@ def test_bars_between_parallel_and_aslant_are_refused_or_come_to_rest_on_each_ot
     """Between what hits with one end after the other and what hits with both there is a gap, and the other way."""
     c, s = 0.5 * np.cos(tilt), 0.5 * np.sin(tilt)
     scene = bars(((-c, 0, 0.1 - s), (c, 0, 0.1 + s)))
+    said = ""
     try:
         motion = solve(scene)
     except SolveError as error:
-        assert "members that lie along each other, or touch at many places, are followed by" in str(error)
+        said = str(error)
         stepping = scene.analysis.model_copy(update={"integrator": "stepping"})
         motion = solve(scene.model_copy(update={"analysis": stepping}))
+    assert not said or "members that lie along each other, or touch at many places, are followed by" in said
     apart = [motion.last.velocity(f"b{i}")[2] - motion.last.velocity(f"a{i}")[2] for i in (0, 1)]
     # Rounding of impulses over masses.
     assert apart == pytest.approx([0.0, 0.0], abs=1e-9)

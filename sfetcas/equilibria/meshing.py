@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,6 +11,7 @@ from ..description.scene import Scene
 from ..errors import SceneError
 from ..mechanics.accuracy import gained, halving, remaining
 from ..mechanics.elements import ELEMENTS
+from ..mechanics.equations import Equations
 from ..mechanics.mesh import Mesh, Remembered, first_mesh, uniform_mesh
 from ..mechanics.model import Model, assemble
 from ..solvers.prepared import Prepared, Solved
@@ -31,6 +33,9 @@ PILOT_ELEMENTS = 60
 
 PILOT_ORDER = 4
 """Coarse meshes of lower order have equilibria that no beam has."""
+
+RECENT = 12
+"""Meshes whose equations are kept: steps that are tried again have the same elements and points of contact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +97,7 @@ class Meshing:
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.assembly: Any = settings.assembly
         self.model: Model | None = None
+        self._recent: list[Equations] = []
         self.switch_branch = scene.analysis.unstable == "leave"
         self._choose_meshes()
         # Where the mesh is the library's own, its default accuracy is a promise as well.
@@ -155,11 +161,18 @@ class Meshing:
     def prepared(self, mesh: Mesh) -> Prepared:
         """The assembled model on a mesh, ready to be solved."""
         begin = time.perf_counter()
-        # A state goes from mesh to mesh with its multipliers: all meshes share the assembly of the first.
-        self.model = assemble(self.scene, mesh, assembly=self.assembly, like=self.model)
+        equations = next((one for one in self._recent if one.model.mesh.same(mesh)), None)
+        if equations is None:
+            # A state goes from mesh to mesh with its multipliers: all meshes share the assembly of the first.
+            model = assemble(self.scene, mesh, assembly=self.assembly, like=self.model)
+            equations = Prepared(model, kernels=self.settings.kernels).equations
+            # What members remember is no part of what is compared.
+            self._recent = [] if self.scene.remembers else [equations, *self._recent[: RECENT - 1]]
+        self.model = equations.model
         self.assembly = self.model.assembly
         prepared = Prepared(self.model, kernels=self.settings.kernels)
-        _ = prepared.equations
+        # What is found out about rows of one state is no part of another.
+        prepared.equations = copy.copy(equations)
         self.seconds["model"] += time.perf_counter() - begin
         return prepared
 
