@@ -9,7 +9,9 @@ next stable state and the answer says so.  N and 2 N links together estimate the
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,15 +22,17 @@ from sfetcas.mathematics.threads import single_threaded
 
 from .contact_chain import Chain, ChainState, NotAChainError, in_space
 
-__all__ = ["WIDTHS", "ChainAnswer", "chain_contact", "emerged", "followed", "free_way", "settled"]
+__all__ = ["NARROW", "WIDTHS", "ChainAnswer", "chain_contact", "emerged", "followed", "free_way", "settled"]
 
 Table = dict[str, Any]
 
 LINKS = {2: 20, 3: 12}
 """Links of a flexible member in the coarser of the two chains, in the plane and in space."""
 
-WIDTHS = (2e-3, 5e-4, 1.2e-4, 3e-5)
-"""Depths over the scene's size by which obstacles can be entered: on the way, and narrower ones at its end."""
+WIDTHS, NARROW = (2e-3, 5e-4, 1.2e-4, 3e-5), (1.2e-4, 3e-5)
+"""Depths over the scene's size by which obstacles can be entered: on the way, and narrower ones at its end; those for
+scenes near to a limit load, which shifts by ten times the depth.
+"""
 
 FIRST_STEP, LAST_STEP = 1.0 / 24.0, 3e-4
 """Increments of the factor: at first, and the smallest, at which a state that still moves far has snapped."""
@@ -84,7 +88,7 @@ class ChainAnswer:
 
 
 @single_threaded
-def chain_contact(scene: Table, links: int | None = None) -> ChainAnswer:
+def chain_contact(scene: Table, links: int | None = None, widths: Sequence[float] = WIDTHS) -> ChainAnswer:
     """Follow the loads of a scene, a dictionary as in its file, from zero to factor 1.
 
     Parameters
@@ -95,6 +99,8 @@ def chain_contact(scene: Table, links: int | None = None) -> ChainAnswer:
         gravity, moments in the plane, prescribed motions; planes, circles, spheres and cylinders.
     links : int, optional
         N, of a flexible member.
+    widths : sequence of float
+        As ``WIDTHS``.
 
     Raises
     ------
@@ -103,22 +109,22 @@ def chain_contact(scene: Table, links: int | None = None) -> ChainAnswer:
     """
     links = links or LINKS[3 if in_space(scene) else 2]
     coarse, fine = Chain(scene, links), Chain(scene, 2 * links)
-    first, _ = followed(coarse)
-    second, snaps = followed(fine)
+    first, _ = followed(coarse, widths)
+    second, snaps = followed(fine, widths)
     size = fine.size
     one, two = coarse.shapes(first), fine.shapes(second)
     error = max(float(np.linalg.norm(one[name] - two[name], axis=1).max()) for name in two)
     places = {name: size * (two[name] + (two[name] - one[name]) / 3.0) for name in two}
     places = {name: np.pad(p, ((0, 0), (0, 3 - fine.dim))) for name, p in places.items()}
     ends = {node: (name, i) for name, m in scene["members"].items() for node, i in zip(m["nodes"], (0, -1))}
-    energy = fine.potential(second, 1.0, WIDTHS[-1]) - fine.potential(fine.start(), 1.0, WIDTHS[-1])
+    energy = fine.potential(second, 1.0, widths[-1]) - fine.potential(fine.start(), 1.0, widths[-1])
     return ChainAnswer(
         {node: places[ends[node][0]][ends[node][1]] for node in fine.names},
         places,
         size * error,
         size,
         energy * fine.unit / size,
-        fine.touches(second, WIDTHS[-1]),
+        fine.touches(second, widths[-1]),
         tuple(snaps),
         error < 0.02,
     )
@@ -134,14 +140,16 @@ def free_way(scene: Table, links: int = 8) -> Array:
         What is not known here.
     """
     chain, seen = Chain({**scene, "contacts": {}}, links), list[Array]()
-    followed(chain, seen)
+    followed(chain, seen=seen)
     return np.pad(chain.size * np.vstack(seen), ((0, 0), (0, 3 - chain.dim)))
 
 
-def followed(chain: Chain, seen: list[Array] | None = None) -> tuple[ChainState, list[float]]:
+def followed(
+    chain: Chain, widths: Sequence[float] = WIDTHS, seen: list[Array] | None = None
+) -> tuple[ChainState, list[float]]:
     """From zero to factor 1: the state there, and factors at which it snapped."""
     state, s, step, snaps = chain.start(), 0.0, FIRST_STEP, []
-    width = WIDTHS[0]
+    width = widths[0]
     while s < 1.0:
         step = min(step, 1.0 - s, chain.longest)
         last = step <= LAST_STEP
@@ -164,7 +172,7 @@ def followed(chain: Chain, seen: list[Array] | None = None) -> tuple[ChainState,
         if seen is not None:
             seen.append(chain.points(state))
     before = chain.points(state)
-    for wider, width in zip(WIDTHS, WIDTHS[1:]):
+    for wider, width in itertools.pairwise(widths):
         narrower = emerged(chain, state, wider, width)
         found = settled(chain, narrower, 1.0, width, True)[0]
         if found is None:

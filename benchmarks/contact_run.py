@@ -23,7 +23,7 @@ from sfetcas.description.scenefile import dump
 from sfetcas.errors import SceneError, SolveError
 
 from .contact_chain import QUARTERS, NotAChainError
-from .contact_oracle import ChainAnswer, chain_contact
+from .contact_oracle import NARROW, WIDTHS, ChainAnswer, chain_contact
 from .contact_scenes import FAMILIES, contact_scene
 from .worker import Worker
 
@@ -99,11 +99,11 @@ def _solved(table: dict[str, Any], seconds: float) -> _Said:
     return _Said(places, notes, taken)
 
 
-def _chained(table: dict[str, Any], seconds: float) -> ChainAnswer | str:
+def _chained(table: dict[str, Any], seconds: float, widths: Sequence[float] = WIDTHS) -> ChainAnswer | str:
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
     signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
-        return chain_contact(table)
+        return chain_contact(table, widths=widths)
     except NotAChainError as error:
         return str(error)
     finally:
@@ -144,6 +144,11 @@ def _judged(table: dict[str, Any], chain: ChainAnswer, worker: Worker, seconds: 
     if apart <= most:
         kind = "right, jump untold" if chain.snapped and not _of_jump(said.notes) else "right"
         return kind, said.seconds, words
+    if chain.snapped:
+        # Soft obstacles may make it snap before its time.
+        harder, _ = worker.ask(_chained, table, seconds, NARROW)
+        if isinstance(harder, ChainAnswer) and not harder.snapped and _apart(said, harder) <= most:
+            return "right", said.seconds, f"{words}, none with narrow obstacles"
     words = f"apart by {apart:.3f}; {words}"
     if not chain.agree:
         return "undecided", said.seconds, words
