@@ -45,6 +45,11 @@ FLAT = 1e-3
 line where they cannot slide: what members may penetrate each other by, too.
 """
 
+LEVEL = 3e-3
+"""Gap, over the size, up to which a member lies along an obstacle between places at which it touches: on coarse
+elements 2e-3 were found along lines, and 5e-3 where it touched a drum with both ends and in its middle.
+"""
+
 LIFTED = 3e-6
 """Gap, over the size, from which on a line does not reach the end of a member, or is interrupted: on coarse elements
 pressure may vanish somewhere within.
@@ -279,10 +284,11 @@ class Lines:
             places = [point.at[0] for point in own]
             # What touches at a node touches with all members there.
             places += [x for x in self._shared(pair, points) if x not in places]
-            known = key in self.keys
-            needed = (
-                least if pair.stop is not None else LINE if least < LINE and self._flat(found, pair, places) else np.inf
+            known, between = key in self.keys, pair.stop is None
+            flat = known or (
+                self._flat(found, pair, places) if between else least < LINE or self._level(found, pair, places)
             )
+            needed = np.inf if not flat or (between and least == LINE) else LINE if between else least
             # Points that have slid to where others are, or begin there, make no line.
             apart = np.diff(np.sort(places)) * self.closest.lengths[pair.members[0]] >= ONE * SAME * pair.width
             if (self.chosen(key) or not any(map(slides, own))) if known else 1 + apart.sum() < needed:
@@ -318,6 +324,12 @@ class Lines:
         middles = 0.5 * (np.sort(places)[1:] + np.sort(places)[:-1])
         near = {one.at[0] for one in self.closest.beside(found.fields, pair, middles, FLAT * pair.distance)}
         return len(places) >= LINE and near == set(middles.tolist())
+
+    def _level(self, found: Solved, pair: Pair, places: Sequence[float]) -> bool:
+        """Whether a member is nowhere far from an obstacle between places at which it touches that."""
+        middles = 0.5 * (np.sort(places)[1:] + np.sort(places)[:-1])
+        gaps = (self.closest.gap_at(found.fields, pair.key, x) for x in middles.tolist())
+        return max(gaps, default=0.0) < LEVEL * self.scene.size
 
     def _shared(self, pair: Pair, points: Points) -> list[float]:
         """Ends of the member of a pair on an obstacle that are nodes at which points of other members are."""

@@ -568,8 +568,9 @@ class MemberContact:
         since, solved, several, least = source, False, False, LINE
         self.edges.begin(source.fields)
         careful, alone, short = False, set[object](), set[PairKey]()
+        flat: Points = ()
+        most: Points = ()
         for _ in range(ROUNDS // 3 if ends else ROUNDS):
-            flat: Points = ()
             found = self.solved(mesh, points, source, way, since if drag else None, drag, ends)
             if found is None and ends:
                 return None
@@ -584,6 +585,7 @@ class MemberContact:
                 else:
                     return None
             lined = None if careful else self.lines.lengthened(found, flat or points_of(found), least)
+            flat = ()
             parted = None if careful or lined else self.lines.parted(found, self.tolerance, np.inf, short)
             if parted is not None:
                 lined = parted[:2]
@@ -600,9 +602,13 @@ class MemberContact:
                 if changes == 1:
                     # What changes alone for the second time goes round.
                     key = frozenset((p.key, p.slides, p.new) for p in points)
-                    if key in alone:
+                    if key in alone and (ends or least == SHORT_LINE):
                         return None
+                    if key in alone:
+                        # Between the places of which one takes the place of the other a member is flat.
+                        flat, least, most = most, SHORT_LINE, ()
                     alone.add(key)
+                    most = max(most, points, key=len)
             source, solved = found, True
         return None
 
