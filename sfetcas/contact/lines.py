@@ -45,9 +45,9 @@ FLAT = 1e-3
 line where they cannot slide: what members may penetrate each other by, too.
 """
 
-LEVEL = 3e-3
-"""Gap, over the size, up to which a member lies along an obstacle between places at which it touches: on coarse
-elements 2e-3 were found along lines, and 5e-3 where it touched a drum with both ends and in its middle.
+LEVEL = 1e-3
+"""Gap, over the size, up to which a member lies along an obstacle between two places at which it touches: on lines none
+was found, and 2e-3 and 5e-3 where it touched a drum with both ends and in its middle.
 """
 
 LIFTED = 3e-6
@@ -326,10 +326,10 @@ class Lines:
         return len(places) >= LINE and near == set(middles.tolist())
 
     def _level(self, found: Solved, pair: Pair, places: Sequence[float]) -> bool:
-        """Whether a member is nowhere far from an obstacle between places at which it touches that."""
+        """Whether a member is near to an obstacle somewhere between two places at which it touches that."""
         middles = 0.5 * (np.sort(places)[1:] + np.sort(places)[:-1])
         gaps = (self.closest.gap_at(found.fields, pair.key, x) for x in middles.tolist())
-        return max(gaps, default=0.0) < LEVEL * self.scene.size
+        return min(gaps, default=0.0) < LEVEL * self.scene.size
 
     def _shared(self, pair: Pair, points: Points) -> list[float]:
         """Ends of the member of a pair on an obstacle that are nodes at which points of other members are."""

@@ -823,9 +823,9 @@ class MemberContact:
             turned = 0.0 if there is None else self.turned(now.solved.fields, there.fields)
             falling = there is not None and self.unstable(there, way(part))
             # What turns so much faster than before may have gone over to another branch.
-            sudden = turned > max(SLOW, SUDDEN * pace * (part - now.part)) and pace > 0.0
-            sudden = sudden or (there is not None and self._aside(now.solved, there))
-            if there is None or ((falling or sudden) and step > NARROW):
+            sudden = turned > max(TOLD, SUDDEN * pace * (part - now.part)) and pace > 0.0
+            aside = there is not None and self._aside(now.solved, there)
+            if there is None or ((falling or sudden or aside) and step > NARROW):
                 # What was taken for a line on the way to a state that is not taken is none.
                 step, self.lines.keys = 0.5 * (part - now.part), lines
                 if there is None and step < NARROW and left < now.part:
@@ -843,6 +843,8 @@ class MemberContact:
                     return None
                 self.jumps.append((part, JUMPED))
                 there = rest
+            elif sudden:
+                self.jumps.append((part, ENDED))
             # As long as turns by a little less than a stride.
             longer = min(2.0, AIM * self.stride / max(turned, 0.1 * self.stride))
             pace = turned / (part - now.part) if not falling else 0.0
