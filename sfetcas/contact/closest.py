@@ -28,7 +28,7 @@ from ..mechanics.tables import Tables
 from .nearby import ALIKE, ITERATIONS, Nearby, Places
 from .pairs import SAME, Near, Pair, PairKey
 
-__all__ = ["BEHIND_EDGE", "Closest", "answers"]
+__all__ = ["BEHIND_EDGE", "LIFTED", "Closest", "answers"]
 
 PIECES, COARSE = 4, 2
 """Straight pieces of an element at least, and how many times fewer and longer they are in a coarse search: chains then
@@ -59,6 +59,11 @@ BEHIND_EDGE = 0.2
 LYING, SAMPLES = (1e-8, 1e-6), 7
 """Shares of the size of the scene between which that is up to which a gap between touches is none, and number of places
 where it is seen.
+"""
+
+LIFTED = 3e-6
+"""Gap, over the size, from which on a line does not reach the end of a member, or is interrupted: on coarse elements
+pressure may vanish somewhere within.
 """
 
 
@@ -469,7 +474,8 @@ def answers(fields: Fields, error: float | None = None) -> dict[str, dict[str, A
             continue
         entries = [_entry(fields, point) for point in points]
         if not contact.between_members:
-            entries = _stretches(fields, closest, points, entries)
+            lifted = min(LYING[1] if error is None else error, LIFTED) * scene.size
+            entries = _stretches(fields, closest, points, entries, lifted)
         found[name] = entries[0] if len(entries) == 1 else {key: [e[key] for e in entries] for key in entries[0]}
     return found
 
@@ -490,9 +496,15 @@ def _entry(fields: Fields, point: ContactPoint) -> dict[str, Any]:
 
 
 def _stretches(
-    fields: Fields, closest: Closest, points: Sequence[ContactPoint], entries: Sequence[dict[str, Any]]
+    fields: Fields,
+    closest: Closest,
+    points: Sequence[ContactPoint],
+    entries: Sequence[dict[str, Any]],
+    lifted: float,
 ) -> list[dict[str, Any]]:
-    """Entries of points on an obstacle, those between which a member lies on it as one along a stretch."""
+    """Entries of points on an obstacle, those between which a member lies on it, or is ``lifted`` by so little, m, as
+    one along a stretch.
+    """
     mesh, found = fields.model.mesh, list[dict[str, Any]]()
     extents = [_extent(mesh, point, entry) for point, entry in zip(points, entries, strict=True)]
     for i in sorted(range(len(points)), key=lambda i: (points[i].members, extents[i])):
@@ -500,7 +512,7 @@ def _stretches(
         if found and found[-1]["member"] == entry["member"]:
             before = found[-1]
             first, last = np.broadcast_to(before["at"], 2).tolist()
-            if begin <= last or closest.lies(fields, points[i].pair, last, begin):
+            if begin <= last or closest.lies(fields, points[i].pair, last, begin, lifted):
                 begin, end = first, max(end, last)
                 gap = max(before["gap"], entry["gap"], key=abs)
                 entry = {**entry, "force": before["force"] + entry["force"], "gap": gap}

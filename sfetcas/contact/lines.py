@@ -23,7 +23,7 @@ from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Mesh, breaks_of
 from ..mechanics.segments import SAME_CUT, standing
 from ..solvers.prepared import Solved
-from .closest import Closest
+from .closest import LIFTED, Closest
 from .pairs import ONE, SAME, Near, Pair, PairKey
 
 __all__ = ["LINE", "SHORT_LINE", "Lines", "Points", "begun", "ends_of", "lies_along", "points_in", "points_of"]
@@ -48,11 +48,6 @@ line where they cannot slide: what members may penetrate each other by, too.
 LEVEL = 1e-3
 """Gap, over the size, up to which a member lies along an obstacle between two places at which it touches: on lines none
 was found, and 2e-3 and 5e-3 where it touched a drum with both ends and in its middle.
-"""
-
-LIFTED = 3e-6
-"""Gap, over the size, from which on a line does not reach the end of a member, or is interrupted: on coarse elements
-pressure may vanish somewhere within.
 """
 
 MORE = 3
