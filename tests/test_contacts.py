@@ -299,15 +299,18 @@ def test_wall_contact_is_symmetric(nodes):
 
 
 def test_flat_stretch_that_buckles_is_left():
-    """P l^2 > 4 pi^2 EI of the flat part: it leaves the wall in its middle, and two places stay.
-
-    It turns by 0.03 rad there, less than what is told.
-    """
+    """P l^2 > 4 pi^2 EI of the flat part: it leaves the wall in its middle, and two places stay."""
     before, after = solve(made(between_walls(0.1, [0.06, 0.08]))).steps
     assert all(isinstance(at, list) for at in before.contacts["upper"]["at"])
     assert before.certificate.stable is True
     assert all(isinstance(at, float) for at in after.contacts["upper"]["at"])
     assert after.certificate.stable is True
+
+
+@pytest.mark.xfail(strict=True, reason="it turns by 0.03 rad there, less than what is told of a jump")
+def test_flat_stretch_that_buckles_is_told():
+    _, after = solve(made(between_walls(0.1, [0.06, 0.08]))).steps
+    assert any("left an unstable equilibrium" in note for note in after.notes)
 
 
 def test_loads_may_come_and_go():
@@ -713,7 +716,16 @@ def test_ring_is_flattened_on_a_floor():
     assert force > point.contacts["floor"]["force"][1]
 
 
-@pytest.mark.parametrize(("element", "elements", "tolerance"), [("SFET2", 200, 1.0 / 200), ("SFET3", 40, 0.02 / 40)])
+@pytest.mark.parametrize(
+    ("element", "elements", "tolerance"),
+    [
+        pytest.param(
+            *("SFET2", 200, 1.0 / 200),
+            marks=pytest.mark.xfail(strict=True, raises=SolveError, reason="refused: a fall on a fine mesh goes round"),
+        ),
+        ("SFET3", 40, 0.02 / 40),
+    ],
+)
 def test_coarse_elements_know_contact_as_well(element, elements, tolerance):
     one = solve(made(CASES["wrapped"])).last.contacts["floor"]
     other = solve(made(CASES["wrapped"]), element=element, elements=elements).last.contacts["floor"]

@@ -400,9 +400,17 @@ def test_a_bar_rebounds_and_topples(tilt, restitution):
     assert np.ptp(totals) < 1e-8 * motion.energies("kinetic").max()
 
 
+REFUSED = pytest.param(
+    *(1e-8, 0.0),
+    marks=pytest.mark.xfail(raises=SolveError, reason="refused between 3e-9 and 1e-8, see the next test; never wrong"),
+)
+
+
 @pytest.mark.fast
-@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
-@pytest.mark.parametrize("tilt", [2.5e-6, 3e-8])
+@pytest.mark.parametrize(
+    ("tilt", "restitution"),
+    [REFUSED, *((tilt, e) for tilt in (2.5e-6, 3e-8, 1e-8) for e in (0.0, 0.5, 1.0) if (tilt, e) != (1e-8, 0.0))],
+)
 def test_nearly_parallel_bars_collide(tilt, restitution):
     """Both ends hit one after the other, sooner than any step: what is lost is told, and both momenta are kept."""
     c, s = 0.5 * np.cos(tilt), 0.5 * np.sin(tilt)

@@ -279,14 +279,16 @@ class Lines:
             places = [point.at[0] for point in own]
             # What touches at a node touches with all members there.
             places += [x for x in self._shared(pair, points) if x not in places]
-            known, between = key in self.keys, pair.stop is None
-            flat = known or (
-                self._flat(found, pair, places) if between else least < LINE or self._level(found, pair, places)
-            )
-            needed = np.inf if not flat or (between and least == LINE) else LINE if between else least
             # Points that have slid to where others are, or begin there, make no line.
             apart = np.diff(np.sort(places)) * self.closest.lengths[pair.members[0]] >= ONE * SAME * pair.width
-            if (self.chosen(key) or not any(map(slides, own))) if known else 1 + apart.sum() < needed:
+            count = 1 + int(apart.sum())
+            if key in self.keys:
+                stays = self.chosen(key) or not any(map(slides, own))
+            elif pair.stop is None:
+                stays = least == LINE or count < LINE or not self._flat(found, pair, places)
+            else:
+                stays = count < least or (least == LINE and not self._level(found, pair, places))
+            if stays:
                 continue
             return self._as_line(found, found.model.mesh, pair, places)
         return None

@@ -123,8 +123,8 @@ below which it is looked whether it has come to rest, and below which it has, th
 """
 
 TOLD = 0.05
-"""Rotation, rad, from which on a fall is told where no equilibrium was near; in so short a step a state that goes on
-turns by less than a fifth of that.
+"""Rotation, rad, from which on a fall is told where no equilibrium was near, and a sudden turn in the shortest step; in
+so short a step a state that goes on turns by less than a fifth of that.
 """
 
 MOST_FALLS = 12
@@ -602,9 +602,9 @@ class MemberContact:
                 if changes == 1:
                     # What changes alone for the second time goes round.
                     key = frozenset((p.key, p.slides, p.new) for p in points)
-                    if key in alone and (ends or least == SHORT_LINE):
-                        return None
                     if key in alone:
+                        if ends or least == SHORT_LINE:
+                            return None
                         # Between the places of which one takes the place of the other a member is flat.
                         flat, least, most = most, SHORT_LINE, ()
                     alone.add(key)

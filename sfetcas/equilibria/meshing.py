@@ -166,8 +166,9 @@ class Meshing:
             # A state goes from mesh to mesh with its multipliers: all meshes share the assembly of the first.
             model = assemble(self.scene, mesh, assembly=self.assembly, like=self.model)
             equations = Prepared(model, kernels=self.settings.kernels).equations
-            # What members remember is no part of what is compared.
-            self._recent = [] if self.scene.remembers else [equations, *self._recent[: RECENT - 1]]
+            # Other meshes do not come again, and may be large; what members remember is no part of what is compared.
+            if mesh.points and not self.scene.remembers:
+                self._recent = [equations, *self._recent[: RECENT - 1]]
         self.model = equations.model
         self.assembly = self.model.assembly
         prepared = Prepared(self.model, kernels=self.settings.kernels)
