@@ -340,8 +340,7 @@ class Stepping(Integrator):
             if not (np.isfinite(residual).all() and (matrix is None or np.isfinite(matrix.data).all())):
                 return None
             pose = self._pose(state, x)
-            # What is followed closely has arrived where it slides to.
-            slides = not closely and k < SLIDING and bool((near.places.held < 3).any())
+            slides = k < SLIDING and bool((near.places.held < 3).any())
             if slides and k:
                 near, forces, slides = self._slid(pose, near, forces)
             friction = touching.friction(near)
