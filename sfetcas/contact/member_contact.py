@@ -114,6 +114,9 @@ step of the way: pressure that is linear along coarse elements leaves some 2e-4,
 place slides some 5e-3.
 """
 
+LESS, MORE = 0.3, 4.0
+"""What drag is multiplied by after a step of a fall, and after one that was not found."""
+
 NUDGE = 0.02
 """Rotation, rad, by which an unstable state is moved along its unstable mode."""
 
@@ -560,7 +563,12 @@ class MemberContact:
             self.lines.keys = lines
             lined = self.lines.parallel(source, mesh)
             found = None if lined is None else self._resolved(*lined, source, way, drag, False)
-            self.lines.keys = lines if found is None else self.lines.keys
+        between = frozenset(key for key in lines if len(key[1]) == 2)
+        if found is None and between:
+            # Members that bend away from each other touch at places that slide again.
+            self.lines.keys = lines - between
+            found = self._resolved(mesh, points, source, way, drag, False)
+        self.lines.keys = lines if found is None else self.lines.keys
         return found
 
     def _resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float, ends: bool) -> Solved | None:
@@ -623,6 +631,7 @@ class MemberContact:
         pushes = np.array([entry["push"] for entry in told])
         lines = self.lines.followed(found) if ended else {}
         ends = ends_of(lines)
+        light = frozenset(now[i] for i in np.flatnonzero(pushes < self.accuracy * pushes.max(initial=0.0)))
         wrong = self._wrong(found, now, pushes)
         more = self._penetrating(fields, [point for point, off in zip(now, wrong, strict=True) if not off])
         states = ["wrong" if off else "right" for off in wrong] + ["new"] * len(more)
@@ -632,11 +641,11 @@ class MemberContact:
             worst = int(np.argmin(np.where(wrong, pushes, np.inf))) if wrong.any() else -1
             kept = [point for i, point in enumerate(now) if i != worst]
             more = () if wrong.any() else more[:1]
-            return (*(self._freed(fields, point, ends) for point in kept), *more), 1
+            return (*(self._freed(fields, point, ends, light) for point in kept), *more), 1
         tried.add(key)
         if wrong.any() or more:
             kept = [point for point, off in zip(now, wrong, strict=True) if not off]
-            slid = tuple(self._freed(fields, point, ends) for point in kept)
+            slid = tuple(self._freed(fields, point, ends, light) for point in kept)
             # What begins to slide on an obstacle may do away with what penetrates beside it.
             begins = {p.pair for p, old in zip(slid, kept, strict=True) if p.slides != old.slides and len(p.at) == 1}
             more = tuple(point for point in more if point.pair not in begins)
@@ -645,7 +654,7 @@ class MemberContact:
         if count:
             return new, 2
         kept = self._merged(now, pushes)
-        slid = self.edges.joined(tuple(self._freed(fields, point, ends) for point in kept))
+        slid = self.edges.joined(tuple(self._freed(fields, point, ends, light) for point in kept))
         moved = self.gripping.off_centre(fields, points, now)
         return slid, int(moved or slid != tuple(now))
 
@@ -689,10 +698,17 @@ class MemberContact:
         near = bool(other.edge) and other.new
         return point.pair == other.pair and (near or self.closest.alike(point.pair, point.at, other.at, ONE))
 
-    def _freed(self, fields: Fields, point: ContactPoint, ends: Collection[tuple[PairKey, float]]) -> ContactPoint:
+    def _freed(
+        self,
+        fields: Fields,
+        point: ContactPoint,
+        ends: Collection[tuple[PairKey, float]],
+        light: Collection[ContactPoint],
+    ) -> ContactPoint:
         """A point as it slides from where it is, though not beyond ends; along a line it stays on the first member.
 
-        ``ends`` are where lines end.
+        ``ends`` are where lines end.  ``light`` points push so little that it does not matter where: they stay at ends
+        of members, from which they would go any way where these lie along each other.
         """
         if point.edge:
             return self.edges.freed(fields, point)
@@ -706,7 +722,7 @@ class MemberContact:
         if stop is not None and stop.kind == "flat" and self.closest.stiff(point.members[0]):
             # What is straight and rigid touches a plane with its ends.
             free = [False]
-        elif not all(free):
+        elif not all(free) and point not in light:
             slopes = self.closest.slopes(fields, point.pair, at)
             # At an end a point goes inwards where that is nearer; what lies there stays.  With friction it would go to
             # where that was before it was set up.
@@ -964,17 +980,18 @@ class MemberContact:
         ``deep`` is minus its lowest eigenvalue, if that is below zero: drag beyond it leaves each step one minimum.
         """
         first, least, largest = DRAGS
-        drag, failed = max(first, BEYOND * deep), False
+        drag, little = max(first, BEYOND * deep), 0.0
         for _ in range(FALLS):
             there = self.resolved(mesh, points_of(now), now, way, drag)
             turned = np.inf if there is None else self.turned(now.fields, there.fields)
             if there is None or turned > STRIDE or self.passed(now.fields, there.fields):
-                drag, failed = 4.0 * drag, True
+                little, drag = drag, drag * min(MORE, max(1.5, turned / (AIM * STRIDE)))
                 if drag > largest * max(deep, 1.0):
                     return None
                 continue
             now, mesh = there, replace(there.model.mesh, points=())
-            if turned < SLOW and drag <= first:
+            # What is unstable is near to an equilibrium where it hardly moves.
+            if turned < SLOW and drag <= first and (turned < STILL or not now.negative):
                 rest = self.resolved(mesh, points_of(now), now, way)
                 if rest is not None and self._near(now, rest):
                     if rest.negative == 0:
@@ -983,10 +1000,10 @@ class MemberContact:
                         return self._fallen_on(mesh, rest, way)
                 if drag <= least:
                     return None
-            # Less than what makes a step unique would lead back to the unstable state.
+            # Less than what makes a step unique would lead back to the unstable state; what has just been too little
+            # is so for a while.
             floor = BEYOND * max(-now.stability.smallest, 0.0) if now.negative else least
-            # What has just been too little is so once more.
-            drag, failed = drag if failed else max(0.3 * drag, floor), False
+            drag, little = max(LESS * drag, np.sqrt(drag * little), floor), LESS * little
         return None
 
     def _near(self, now: Solved, rest: Solved) -> bool:
