@@ -472,6 +472,9 @@ class MemberContact:
         # Points have other numbers than before: rows of points by what they are, all others by their names.
         others = [i for i, name in enumerate(target.row_names) if not name.startswith("contacts.")]
         lam[others] = state.lam[others]
+        # Segments end where points are.
+        closing, forces = source.fields.carried_to(target)
+        lam[closing] = forces
         rows = {name: i for i, name in reversed(list(enumerate(target.row_names)))}
         unit, axes = target.scales.length, target.element.axes
         # Those that continue are where the points of the state are now.

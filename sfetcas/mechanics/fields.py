@@ -19,7 +19,7 @@ from ..description.records import enumerated
 from ..description.tendons import Stretch
 from ..errors import SolveError, Status
 from ..mathematics import curves, quaternion
-from ..mathematics.arrays import Array, first_of_largest, values_of
+from ..mathematics.arrays import Array, Index, first_of_largest, values_of
 from ..mathematics.interpolation import differentiation, evaluation
 from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
@@ -33,7 +33,7 @@ from .magnetism import magnet_terms
 from .memory import dissipated_along
 from .mesh import ContactPoint
 from .relaxation import carried, relax
-from .segments import beside_line, pulled_place, standing
+from .segments import SAME_CUT, beside_line, pulled_place, standing
 from .singles import fibre_strain
 from .stations import Stations
 from .stretch_laws import strain_by_force
@@ -96,6 +96,27 @@ class Fields:
             # Elements on lines begin at places, so that none carries what presses on others.
             pull = pull + pull_within(self._pressing, self.model.element)
         return np.asarray(pull)
+
+    def carried_to(self, model: Any) -> tuple[Index, Array]:
+        """Rows (n,) of another model of the scene that close segments, and their multipliers (n,): what these carry at
+        their ends in this state, wherever other segments end.
+        """
+        rows = np.flatnonzero(model.positions.closes >= 0)
+        pulls = self._equations.segment_pulls(self.state.lam, self._loading)
+        segments, within = self.model.segments, self._loading.pull
+        found = dict[int, Array]()
+        for number in dict.fromkeys(model.positions.closes[rows].tolist()):
+            part = model.segments.parts[number]
+            mine, its = (one.elements_of(part.member).start for one in (self.model, model))
+            end = model.mesh.cuts[part.member][part.elements.stop - its]
+            last = mine + int(np.searchsorted(self.model.mesh.cuts[part.member], end - SAME_CUT)) - 1
+            owner = int(segments.owner[last])
+            found[number] = pulls[owner]
+            if last + 1 < segments.parts[owner].elements.stop:
+                # What is spread along the rest of it.
+                found[number] = found[number] + 0.5 * (within[last, -1] + within[last + 1, 0])
+        each = [found[number] for number in dict.fromkeys(model.positions.closes[rows].tolist())]
+        return rows, np.concatenate([np.zeros(0), *each])
 
     @functools.cached_property
     def _strings(self) -> Array:

@@ -45,6 +45,8 @@ class Positions:
         Names of the closing equations and of the displacement unknowns.
     retained : ndarray (places, axes)
         For each component of a retained place its index in ``y``; -1 where it is prescribed or has none.
+    closes : ndarray (rows,)
+        Number of the segment whose chord a row closes, -1 of other rows.
     """
 
     E: SparseMap
@@ -56,6 +58,7 @@ class Positions:
     rows: tuple[str, ...]
     unknowns: tuple[str, ...]
     retained: Index
+    closes: Index
 
 
 def _slides(scene: Scene, name: str) -> bool:
@@ -98,6 +101,7 @@ class _Placing:
         self.eye = np.eye(axes)
         self.labels: list[str] = []
         self.rows: list[tuple[str, _Place]] = []
+        self.closes: list[int] = []
         self.places: dict[str, _Place] = {}
         self.retained = np.full((len(segments.places), axes), -1, dtype=np.intp)
         self.number = {name: i for i, name in enumerate(segments.places)}
@@ -129,7 +133,7 @@ class _Placing:
         for i, part in enumerate(self.segments.parts):
             if i not in self._used | within:
                 gap = self.places[part.start].plus(self._chord(i)).plus(self.places[part.end], -1.0)
-                self._close(gap, [f"closing of {part.member}, {c}" for c in "xyz"[: self.axes]], self.eye)
+                self._close(gap, [f"closing of {part.member}, {c}" for c in "xyz"[: self.axes]], self.eye, i)
 
     def _loops_within_bodies(self) -> set[int]:
         """Segments that close a loop of rigid members that share one rotation: it stays closed by itself."""
@@ -197,9 +201,10 @@ class _Placing:
         along = self._guide(name)[:, None] @ self._guide(name)[None, :]
         return self._prescribed(name).plus(gap.times(along))
 
-    def _close(self, gap: _Place, names: list[str], directions: Array) -> None:
+    def _close(self, gap: _Place, names: list[str], directions: Array, segment: int = -1) -> None:
         for name, direction in zip(names, directions, strict=True):
             self.rows.append((name, gap.times(direction[None, :])))
+            self.closes.append(segment)
 
     def _spread(self, front: list[str]) -> None:
         """Find places segment by segment, breadth first, so that ways are short."""
@@ -255,6 +260,7 @@ def place_nodes(scene: Scene, segments: Segments, axes: int, closing: bool, bodi
         rows=tuple(label for label, _ in placing.rows),
         unknowns=tuple(placing.labels),
         retained=placing.retained,
+        closes=np.array(placing.closes, dtype=np.intp),
     )
 
 
