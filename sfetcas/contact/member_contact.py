@@ -191,6 +191,7 @@ class MemberContact:
         self.stride, self.first, self.rough = STRIDE, FIRST, ROUGH
         self.jumps: list[tuple[float, str]] = []
         self.redundant: bool | None = None
+        self._loose: frozenset[str] | None = None
         self.lines = Lines(scene, self.closest, fixed)
         self.falls, self.patient = 0, False
         self.edges = Edges(scene, self.closest, self.tolerance)
@@ -449,7 +450,9 @@ class MemberContact:
         return added
 
     def drag(self, prepared: Prepared, since: Solved, size: float) -> Drag:
-        """What resists all rotations, and displacements of nodes that are unknowns."""
+        """What resists all rotations, and displacements of nodes that are unknowns whatever touches: in each choice of
+        points the same resists.
+        """
         model, scene, moved = prepared.model, self.scene, list[int]()
         there = transferred(since.model, since.state, model)
         number = {name: i for i, name in enumerate(model.positions.unknowns)}
@@ -457,10 +460,16 @@ class MemberContact:
         for name, node in scene.nodes.items():
             ways = {f"{name}.{c}": axis for c, axis in zip("xyz"[: model.element.axes], np.eye(3))}
             ways |= {f"travel of {name}": unit(numbers(node.direction))} if node.slides else {}
-            for label in ways.keys() & number.keys():
+            for label in ways.keys() & number.keys() & self._travels(model.mesh):
                 y[number[label]] = ways[label] @ (since.fields.position(name) - node.position) / model.scales.length
                 moved.append(number[label])
         return Drag(prepared.equations, replace(there, y=y), size, np.array(moved, np.intp))
+
+    def _travels(self, mesh: Mesh) -> frozenset[str]:
+        """Names of the displacements that are unknowns where nothing touches."""
+        if self._loose is None:
+            self._loose = frozenset(self.prepare(replace(mesh, points=())).model.positions.unknowns)
+        return self._loose
 
     def carried(self, source: Solved, prepared: Prepared) -> State:
         """A state as the start on another mesh or with other points, which begin where they are now."""
