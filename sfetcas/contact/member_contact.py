@@ -662,9 +662,13 @@ class MemberContact:
             begins = {p.pair for p, old in zip(slid, kept, strict=True) if p.slides != old.slides and len(p.at) == 1}
             more = tuple(point for point in more if point.pair not in begins)
             return (*slid, *more), int(wrong.sum()) + len(more) + len(begins)
-        new, count = self.lines.with_sliding_ends(found, now, pushes, lines) if ended else ((), 0)
-        if count:
-            return new, 2
+        # Where a member is hardly lifted between two lines these may be one with other ends, and so on: either is right.
+        known = frozenset((p.pair, p.slides, p.sides, p.at if not any(p.slides) else ()) for p in now)
+        if ended and known not in tried:
+            new, count = self.lines.with_sliding_ends(found, now, pushes, lines)
+            if count:
+                tried.add(known)
+                return new, 2
         kept = self._merged(now, pushes)
         slid = self.edges.joined(tuple(self._freed(fields, point, ends, light) for point in kept))
         moved = self.gripping.off_centre(fields, points, now)

@@ -108,7 +108,7 @@ class SparseSolver:
     def __init__(self, n: int, row: Array, column: Array, rows: int = 0, *, symmetric: bool = True) -> None:
         self.n, self._row, self._column = n, row, column
         self._small, self._few, self._symmetric = n <= DENSE, rows <= FEW_ROWS, symmetric
-        self._rows = rows
+        self._rows, self._lost = rows, 0
         self._sides = np.repeat([tolerances.SOFT, -tolerances.SOFT], [n - rows, rows])
 
     def factor(self, entries: Array) -> None:
@@ -133,11 +133,12 @@ class SparseSolver:
         if self._few:
             return self._rows_last.solve(self._matrix, columns).reshape(b.shape)
         x, error = np.full(columns.shape, np.nan), np.inf
-        if self._symmetric:
+        if self._symmetric and self._lost < OFTEN:
             soft = self._matrix.copy()
             soft[self._diagonal] += self._sides
             x, error = self._refined(self._without_pivots, soft, columns)
         if not error <= SOLVED:
+            self._lost += 1
             other, least = self._refined(self._with_pivots, self._matrix, columns)
             x = other if not error <= least else x
         return x.reshape(b.shape)
@@ -264,6 +265,9 @@ NOTHING_TO_GAIN = 1e-16
 
 SOLVED = 1e-13
 """Residual, relative to matrix times solution, up to which a solution is accepted."""
+
+OFTEN = 2
+"""Matrices of a pattern that are solved with pivoting after all, from which on others of it are at once."""
 
 
 def pattern(n: int, row: Array, column: Array) -> ca.Sparsity:

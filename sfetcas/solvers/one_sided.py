@@ -26,8 +26,10 @@ __all__ = ["IN_VAIN", "LASTING", "Border", "OneSided"]
 AGAIN, TIMES = 1e-8, 2
 """Relative residual from which on a choice that was made so many times is taken: others differ from it by rounding."""
 
-IN_VAIN = 3
-"""Steps one after the other in which no choice of rows is right, after which no solution is taken to be near."""
+IN_VAIN, TURNS = 3, 7
+"""Steps one after the other in which no choice of rows is right, or one more of the last ``TURNS`` where others come
+between, after which no solution is taken to be near.
+"""
 
 ROUNDING = 1e-11
 """Share of the largest gap, and of the largest push, up to which a wrong sign is rounding."""
@@ -135,7 +137,8 @@ class OneSided(AtLoads):
             self.acting[found > 0.0] ^= True
         near = here.residual <= AGAIN
         self._past.append((self.acting.tobytes() if near else b"", found is not None))
-        if not near and len(self._past) >= IN_VAIN and not any(known for _, known in self._past[-IN_VAIN:]):
+        vain = [not known for _, known in self._past]
+        if not near and (sum(vain[-IN_VAIN:]) == IN_VAIN or sum(vain[-TURNS:]) > IN_VAIN):
             raise np.linalg.LinAlgError("again and again no choice of rows is right")
         if found is None:
             return self._with_factor(moved[:, 0], factor[0])
