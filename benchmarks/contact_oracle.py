@@ -155,6 +155,10 @@ def followed(
         last = step <= LAST_STEP
         tried, count, unstable = settled(chain, state, s + step, width, last)
         far = math.inf
+        if tried is not None and chain.passed(state, tried):
+            if last:
+                raise NotAChainError(f"links pass each other at factor {s + step:.6g}")
+            tried = None
         if tried is not None:
             far = float(np.abs(chain.points(tried) - chain.points(state)).max())
         if (tried is None or far > (FAR_UNSTABLE if unstable else FAR)) and not last:
@@ -272,7 +276,7 @@ def settled(
                     break
             scale *= 0.5
         if accepted is None:
-            if np.abs(gr).max(initial=0.0) < 1e-5 * chain.strength and convex:
+            if np.abs(gr).max(initial=0.0) < 1e-5 * chain.strength and convex and not normal.any():
                 return state, count, unstable
             return None, count, unstable
         state, energy = accepted

@@ -23,6 +23,9 @@ from .random_checks import Defects, Pushed, defects
 
 __all__ = ["Touch", "nearest", "touches", "wrong_contacts"]
 
+EDGE = 1.05
+"""How much further along members than the limit a place is that is none of the nearest by it."""
+
 PLACES = 600
 """Places along a member between which distances are looked for."""
 
@@ -66,22 +69,27 @@ def nearest(step: Equilibrium) -> Iterator[tuple[str, str, float, float, float, 
                 if a == b and scene.members[a].type == "rigid":
                     continue
                 radii = [contact_radius(contact, scene.members[m], scene.sections) or 0.0 for m in (a, b)]
-                s, t, gap = _nearest(step, places, x, a, b, sum(radii))
+                limit = NEXT_TO * 0.5 * np.pi * sum(radii)
+                s, t, gap = _nearest(step, places, x, a, b, limit)
+                while np.isfinite(gap) and _beside(scene, a, b, np.array([s]), np.array([t]), EDGE * limit)[0, 0]:
+                    # Nearer to a common node they are nearer still: no place where they touch.
+                    limit *= EDGE
+                    s, t, gap = _nearest(step, places, x, a, b, limit)
                 yield a, b, s, t, gap - sum(radii), sum(radii)
 
 
 def _nearest(
-    step: Equilibrium, places: dict[str, Array], x: Array, a: str, b: str, distance: float
+    step: Equilibrium, places: dict[str, Array], x: Array, a: str, b: str, limit: float
 ) -> tuple[float, float, float]:
-    """Fractions and distance of the nearest places that do not follow each other along members; refined three times."""
+    """Fractions and distance of the nearest places further from each other along members than a limit; refined three
+    times.
+    """
     scene = step.model.scene
-    lengths = [scene.center_lines[m].length for m in (a, b)]
-    limit = NEXT_TO * 0.5 * np.pi * distance
     s, t, first, second = x, x, places[a], places[b]
     best = (0.0, 0.0, np.inf)
     for _ in range(5):
         apart = np.linalg.norm(first[:, None] - second[None], axis=2)
-        apart[_beside(scene, a, b, s, t, lengths, limit)] = np.inf
+        apart[_beside(scene, a, b, s, t, limit)] = np.inf
         i, j = np.unravel_index(int(np.argmin(apart)), apart.shape)
         best = min(best, (float(s[i]), float(t[j]), float(apart[i, j])), key=lambda one: one[2])
         if not np.isfinite(best[2]):
@@ -92,8 +100,9 @@ def _nearest(
     return best
 
 
-def _beside(scene: Scene, a: str, b: str, s: Array, t: Array, lengths: list[float], limit: float) -> Array:
-    """Which places (n, m) follow each other along one member or over a common node."""
+def _beside(scene: Scene, a: str, b: str, s: Array, t: Array, limit: float) -> Array:
+    """Which places (n, m) follow each other along one member or over a common node, nearer than a limit."""
+    lengths = [scene.center_lines[m].length for m in (a, b)]
     if a == b:
         return np.asarray(np.abs(s[:, None] - t[None]) * lengths[0] < limit)
     found = np.zeros((len(s), len(t)), bool)

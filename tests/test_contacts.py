@@ -719,10 +719,7 @@ def test_ring_is_flattened_on_a_floor():
 @pytest.mark.parametrize(
     ("element", "elements", "tolerance"),
     [
-        pytest.param(
-            *("SFET2", 200, 1.0 / 200),
-            marks=pytest.mark.xfail(strict=True, raises=SolveError, reason="refused: a fall on a fine mesh goes round"),
-        ),
+        ("SFET2", 200, 1.0 / 200),
         ("SFET3", 40, 0.02 / 40),
     ],
 )

@@ -318,6 +318,24 @@ def test_straight_ropes_whose_ends_come_nearer_lie_across_each_other():
     assert np.linalg.norm(step.contacts["pair"]["force"]) > 1.0
 
 
+@pytest.mark.parametrize(
+    ("kind", "seed", "forces"),
+    [
+        # Beyond where a bar presses on a beam this has no load, and lies along the bar to its end.
+        ("bar", 0, 1),
+        # Ropes that turn over need more than eighty steps, where each that is too long makes the next ones short.
+        pytest.param("ropes", 24, 3, marks=pytest.mark.long),
+        # A line within which rods bend away from each other: they touch at its ends, and these slide.
+        pytest.param("twisted", 20, 1, marks=pytest.mark.long),
+    ],
+)
+def test_members_at_random_that_were_refused(kind, seed, forces):
+    step = solve(Scene.from_dict(member_scene(kind, seed))).last
+    assert wrong_contacts(step) == []
+    assert step.certificate.stable is True
+    assert sum(np.linalg.norm(force) > 0.0 for force in np.reshape(step.contacts["c"]["force"], (-1, 3))) >= forces
+
+
 def test_a_hinge_between_two_members_is_pushed_through_both():
     """The node is the end of one and the beginning of the other: balance is that of both with half of the push each."""
     step = solve(Scene.from_dict(member_scene("hinged", 0))).last

@@ -451,24 +451,27 @@ class MemberContact:
 
     def drag(self, prepared: Prepared, since: Solved, size: float) -> Drag:
         """What resists all rotations, and displacements of nodes that are unknowns whatever touches: in each choice of
-        points the same resists.
+        points the same resists.  Where they are not, as of what is free, it resists those of all that are.
         """
         model, scene, moved = prepared.model, self.scene, list[int]()
         there = transferred(since.model, since.state, model)
         number = {name: i for i, name in enumerate(model.positions.unknowns)}
-        y = there.y.copy()
+        y, loose = there.y.copy(), self._travels(model.mesh)
+        loose = loose if loose <= number.keys() else frozenset(number)
         for name, node in scene.nodes.items():
             ways = {f"{name}.{c}": axis for c, axis in zip("xyz"[: model.element.axes], np.eye(3))}
             ways |= {f"travel of {name}": unit(numbers(node.direction))} if node.slides else {}
-            for label in ways.keys() & number.keys() & self._travels(model.mesh):
+            for label in ways.keys() & number.keys() & loose:
                 y[number[label]] = ways[label] @ (since.fields.position(name) - node.position) / model.scales.length
                 moved.append(number[label])
         return Drag(prepared.equations, replace(there, y=y), size, np.array(moved, np.intp))
 
     def _travels(self, mesh: Mesh) -> frozenset[str]:
-        """Names of the displacements that are unknowns where nothing touches."""
+        """Names of the displacements of nodes that are unknowns where nothing touches."""
         if self._loose is None:
-            self._loose = frozenset(self.prepare(replace(mesh, points=())).model.positions.unknowns)
+            nodes = {f"{prefix}{name}" for name in self.scene.nodes for prefix in ("", "travel of ")}
+            unknowns = self.prepare(replace(mesh, points=())).model.positions.unknowns
+            self._loose = frozenset(one for one in unknowns if one in nodes or one.rpartition(".")[0] in nodes)
         return self._loose
 
     def carried(self, source: Solved, prepared: Prepared) -> State:
