@@ -474,9 +474,12 @@ class Lines:
             kept += [k for k in self.allowed(mesh, kept, self.laid(near)) if (k.at, k.sides) not in have]
         return tuple(kept)
 
-    def followed(self, found: Solved) -> dict[PairKey, list[list[float]]]:
-        """The stretches of lines whose ends slide: on obstacles, of members whose mesh is not prescribed."""
-        every = self.stretches(found, LIFTED * self.scene.size)
+    def followed(self, found: Solved, times: float = 1.0) -> dict[PairKey, list[list[float]]]:
+        """The stretches of lines whose ends slide: on obstacles, of members whose mesh is not prescribed.
+
+        Within one a member may rise by so many times LIFTED of the size.
+        """
+        every = self.stretches(found, times * LIFTED * self.scene.size)
         return {key: own for key, own in every.items() if self.chosen(key)}
 
     def points_on(self, mesh: Mesh, found: Solved) -> Points:

@@ -49,6 +49,11 @@ Way = Callable[[Model], Loading]
 ROUNDS = 30
 """Changes of the points at one loading, at most."""
 
+AGAIN, HARDLY = 6, 100.0
+"""Digits to which places are the same where points come again with nothing wrong with them; how many times as far
+members may then rise within a line.
+"""
+
 SOFTENED, LEAST_SOFTENED = 0.125, 1e-3
 """First and least step of the way on which what is rough ceases to give way, parts of it."""
 
@@ -474,8 +479,11 @@ class MemberContact:
             self._loose = frozenset(one for one in unknowns if one in nodes or one.rpartition(".")[0] in nodes)
         return self._loose
 
-    def carried(self, source: Solved, prepared: Prepared) -> State:
-        """A state as the start on another mesh or with other points, which begin where they are now."""
+    def carried(self, source: Solved, prepared: Prepared, *, rests: bool = True) -> State:
+        """A state as the start on another mesh or with other points, which begin where they are now.
+
+        What segments carry is known in a state that ``rests``.
+        """
         target, before = prepared.model, source.model
         state = transferred(before, source.state, target)
         y, lam = state.y.copy(), np.zeros_like(state.lam)
@@ -484,9 +492,10 @@ class MemberContact:
         # Points have other numbers than before: rows of points by what they are, all others by their names.
         others = [i for i, name in enumerate(target.row_names) if not name.startswith("contacts.")]
         lam[others] = state.lam[others]
-        # Segments end where points are.
-        closing, forces = source.fields.carried_to(target)
-        lam[closing] = forces
+        if rests:
+            # Segments end where points are.
+            closing, forces = source.fields.carried_to(target)
+            lam[closing] = forces
         rows = {name: i for i, name in reversed(list(enumerate(target.row_names)))}
         unit, axes = target.scales.length, target.element.axes
         # Those that continue are where the points of the state are now.
@@ -665,12 +674,13 @@ class MemberContact:
             begins = {p.pair for p, old in zip(slid, kept, strict=True) if p.slides != old.slides and len(p.at) == 1}
             more = tuple(point for point in more if point.pair not in begins)
             return (*slid, *more), int(wrong.sum()) + len(more) + len(begins)
-        # Where a member is hardly lifted between two lines these may be one with other ends, and so on: either is right.
-        known = frozenset((p.pair, p.slides, p.sides, p.at if not any(p.slides) else ()) for p in now)
-        if ended and known not in tried:
+        if ended:
+            # Where a member is hardly lifted between two lines these may be one with other ends, and so on: then it is.
+            same = frozenset((p.pair, p.slides, p.sides, *(round(x, AGAIN) for x in p.at)) for p in now)
+            lines = self.lines.followed(found, HARDLY) if same in tried else lines
             new, count = self.lines.with_sliding_ends(found, now, pushes, lines)
             if count:
-                tried.add(known)
+                tried.add(same)
                 return new, 2
         kept = self._merged(now, pushes)
         slid = self.edges.joined(tuple(self._freed(fields, point, ends, light) for point in kept))
@@ -722,7 +732,7 @@ class MemberContact:
         fields: Fields,
         point: ContactPoint,
         ends: Collection[tuple[PairKey, float]],
-        light: Collection[ContactPoint],
+        light: Collection[ContactPoint] = (),
     ) -> ContactPoint:
         """A point as it slides from where it is, though not beyond ends; along a line it stays on the first member.
 
@@ -749,8 +759,8 @@ class MemberContact:
             free = [0.0 < x < 1.0 or (0.5 - x) * slope < -lies for x, slope in zip(at, slopes.tolist(), strict=True)]
         ends_line = all(point.sides) and not point.line and (point.pair, point.at[0]) in ends
         slides = (free[0] and (ends_line or not self.lines.has(point)), *free[1:])
-        same = not point.new and slides == point.slides
-        return point if same else replace(point, slides=slides, normal=normal, new=False)
+        stays = not point.new and slides == point.slides
+        return point if stays else replace(point, slides=slides, normal=normal, new=False)
 
     def _penetrating(self, fields: Fields, points: list[ContactPoint]) -> Points:
         """New points where members penetrate each other, the deepest first."""
@@ -853,7 +863,9 @@ class MemberContact:
                 if step >= SHORTEST:
                     self.lines.keys = lines
                     continue
-            there = None if there is None else self._refined(there, way(part))
+            finer = None if there is None else self._refined(there, way(part))
+            # In the shortest steps what is not found on a finer mesh goes on as it is: the answer is refined all the same.
+            there = there if finer is None and step <= NARROW else finer
             mesh = mesh if there is None else replace(there.model.mesh, points=())
             turned = 0.0 if there is None else self.turned(now.solved.fields, there.fields)
             falling = there is not None and self.unstable(there, way(part))
@@ -943,7 +955,7 @@ class MemberContact:
             if not any(marked.any() for marked in marks.values()):
                 return found
             mesh = replace(model.mesh.refined(marks, found.fields.kinks), points=())
-            finer = self.resolved(mesh, points_of(found), found, way)
+            finer = self.resolved(mesh, self.lines.points_on(mesh, found), found, way)
             if finer is None or self.turned(found.fields, finer.fields) > STRIDE:
                 return None
             found = finer

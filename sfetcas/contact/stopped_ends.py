@@ -146,7 +146,7 @@ class StoppedEnds:
 
     def _begun(self, start: State) -> tuple[State, float]:
         """A state without contact as one of the model, and how far obstacles are to be drawn back, dimensionless."""
-        state = self.run.carried(self.taken(start), self.prepared)
+        state = self.run.carried(self.taken(start), self.prepared, rests=False)
         gaps = self.prepared.equations.at(state, self.loading).residual[self.gaps]
         return state, INSIDE * max(0.0, -float(gaps.min(initial=0.0)))
 

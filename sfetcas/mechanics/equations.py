@@ -287,6 +287,12 @@ class Equations:
         y[new] -= np.linalg.lstsq(positions.W.full()[:, new], gaps, rcond=tolerances.RANK)[0]
         return replace(state, y=y)
 
+    @functools.cached_property
+    def slid_places(self) -> Index:
+        """Numbers of the unknowns that say where on a member something slides."""
+        names = enumerate(self.model.positions.unknowns)
+        return np.array([self.rotation_unknowns + i for i, name in names if name.endswith(", arc length")], np.intp)
+
     def segment_pulls(self, lam: Array, loading: Loading) -> Array:
         """Minus the constant part of the internal force of each segment, (segments, axes), dimensionless."""
         return self._closing_pulls(lam) - self._hanging_pulls(loading)

@@ -155,6 +155,10 @@ def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
 # -- to an equilibrium, down to rounding --------------------------------------------------------------------
 
 
+PLACED = 1e-9
+"""Change of a place of contact in a step, a fraction of the length of its member, up to which it is where it is."""
+
+
 class System(Protocol):
     """Equations that :func:`correct` solves: those of an equilibrium, with or without an unknown factor of loads."""
 
@@ -283,13 +287,14 @@ class Balance(Iterate):
     """An iterate of :func:`correct`, with its loading and relative residual.
 
     ``plain`` are the stationarity equations, ``point`` those that :meth:`System.seen` makes of them; ``over`` says that
-    further steps cannot improve it.
+    further steps cannot improve it, ``stalls`` that the last one did not, but moved a place of contact.
     """
 
     plain: Point
     loading: Loading
     residual: float
     over: bool = False
+    stalls: bool = False
 
 
 class Converged(NamedTuple):
@@ -364,6 +369,9 @@ class _Correction:
         if not math.isfinite(there.residual):
             return None
         if there.residual > 0.25 * here.residual and self._low(here):
+            # Where a line ends is known to the root of the residual only: what is left of that goes in a further step.
+            if not here.stalls and np.abs(step[self.equations.slid_places]).max(initial=0.0) > PLACED:
+                return replace(there, stalls=True)
             return replace(there if there.residual < here.residual else here, over=True)
         return there
 
