@@ -1,6 +1,7 @@
 """Contact against closed forms, identities, and what is refused."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from sfetcas.contact.closest import Closest
 from sfetcas.description.obstacles import obstacle
 from sfetcas.description.scene import Contact
 from sfetcas.equilibria.quantities import value_of
+from sfetcas.mechanics.model import assemble
 
 FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "m"}
 
@@ -728,6 +730,28 @@ def test_coarse_elements_know_contact_as_well(element, elements, tolerance):
     other = solve(made(CASES["wrapped"]), element=element, elements=elements).last.contacts["floor"]
     # Where the curvature is constant along an element it is known which one a line ends in; else to a share of it.
     np.testing.assert_allclose(other["at"], one["at"], atol=tolerance)
+
+
+def test_segments_carry_the_same_wherever_others_end():
+    """Where points come and go members are cut elsewhere; what segments carry was given to others in their order."""
+    step = solve(made(CASES["wrapped"])).last
+
+    def ends(model):
+        rows, forces = step.fields.carried_to(model)
+        parts = [model.segments.parts[i] for i in dict.fromkeys(model.positions.closes[rows].tolist())]
+        return dict(zip((model.mesh.cuts["m"][part.elements.stop] for part in parts), forces.reshape(-1, 2)))
+
+    own, closes = ends(step.model), step.model.positions.closes
+    np.testing.assert_array_equal(np.concatenate([*own.values()]), step.fields.state.lam[np.flatnonzero(closes >= 0)])
+    points, seen = step.model.mesh.points, set()
+    for count in range(1, len(points)):
+        fewer = tuple(replace(point, number=i) for i, point in enumerate(points[:count]))
+        found = ends(assemble(step.model.scene, replace(step.model.mesh, points=fewer)))
+        for at in found.keys() & own.keys():
+            np.testing.assert_array_equal(found[at], own[at])
+            # Not by chance: the order is another one.
+            seen |= {at} if [*found].index(at) != [*own].index(at) else set()
+    assert seen
 
 
 # -- what acts on stretches, and jumps ------------------------------------------------------------

@@ -864,7 +864,7 @@ class MemberContact:
                     self.lines.keys = lines
                     continue
             finer = None if there is None else self._refined(there, way(part))
-            # In the shortest steps what is not found on a finer mesh goes on as it is: the answer is refined all the same.
+            # In the shortest steps what no finer mesh has goes on as it is: the answer is refined all the same.
             there = there if finer is None and step <= NARROW else finer
             mesh = mesh if there is None else replace(there.model.mesh, points=())
             turned = 0.0 if there is None else self.turned(now.solved.fields, there.fields)
