@@ -137,8 +137,8 @@ class SparseSolver:
             soft = self._matrix.copy()
             soft[self._diagonal] += self._sides
             x, error = self._refined(self._without_pivots, soft, columns)
+            self._lost = 0 if error <= SOLVED else self._lost + 1
         if not error <= SOLVED:
-            self._lost += 1
             other, least = self._refined(self._with_pivots, self._matrix, columns)
             x = other if not error <= least else x
         return x.reshape(b.shape)
@@ -267,7 +267,7 @@ SOLVED = 1e-13
 """Residual, relative to matrix times solution, up to which a solution is accepted."""
 
 OFTEN = 2
-"""Matrices of a pattern that are solved with pivoting after all, from which on others of it are at once."""
+"""Matrices of a pattern, one after the other, that need pivoting, from which on all of it are solved so at once."""
 
 
 def pattern(n: int, row: Array, column: Array) -> ca.Sparsity:

@@ -103,20 +103,18 @@ class Fields:
         """
         rows = np.flatnonzero(model.positions.closes >= 0)
         pulls = self._equations.segment_pulls(self.state.lam, self._loading)
-        segments, within = self.model.segments, self._loading.pull
-        found = dict[int, Array]()
+        segments, within, found = self.model.segments, self._loading.pull, [np.zeros(0)]
         for number in dict.fromkeys(model.positions.closes[rows].tolist()):
             part = model.segments.parts[number]
             mine, its = (one.elements_of(part.member).start for one in (self.model, model))
             end = model.mesh.cuts[part.member][part.elements.stop - its]
             last = mine + int(np.searchsorted(self.model.mesh.cuts[part.member], end - SAME_CUT)) - 1
             owner = int(segments.owner[last])
-            found[number] = pulls[owner]
-            if last + 1 < segments.parts[owner].elements.stop:
-                # What is spread along the rest of it.
-                found[number] = found[number] + 0.5 * (within[last, -1] + within[last + 1, 0])
-        each = [found[number] for number in dict.fromkeys(model.positions.closes[rows].tolist())]
-        return rows, np.concatenate([np.zeros(0), *each])
+            # What is spread along the rest of a segment that goes on is carried, too.
+            goes_on = last + 1 < segments.parts[owner].elements.stop
+            rest = 0.5 * (within[last, -1] + within[last + 1, 0]) if goes_on else 0.0
+            found.append(pulls[owner] + rest)
+        return rows, np.concatenate(found)
 
     @functools.cached_property
     def _strings(self) -> Array:
