@@ -474,10 +474,6 @@ class Chain:
             turns[body] = self.kind.turned(self.kind.none(1), by[None, -self.dof :])[0]
         return ChainState(turns, state.p)
 
-    def passed(self, before: ChainState, after: ChainState) -> bool:
-        """Whether links have passed each other from one state to another; obstacles nothing passes."""
-        return False
-
     def directions(self, state: ChainState) -> tuple[Array, Array]:
         """Directions of links and their derivatives."""
         return self.kind.directions(state.turns[self.link_body], self.d0)

@@ -155,10 +155,6 @@ def followed(
         last = step <= LAST_STEP
         tried, count, unstable = settled(chain, state, s + step, width, last)
         far = math.inf
-        if tried is not None and chain.passed(state, tried):
-            if last:
-                raise NotAChainError(f"links pass each other at factor {s + step:.6g}")
-            tried = None
         if tried is not None:
             far = float(np.abs(chain.points(tried) - chain.points(state)).max())
         if (tried is None or far > (FAR_UNSTABLE if unstable else FAR)) and not last:

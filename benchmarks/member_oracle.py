@@ -27,9 +27,6 @@ Table = dict[str, Any]
 LINKS = {2: 20, 3: 14}
 """Links of a flexible member in the coarser of the two chains, in the plane and in space."""
 
-NEAR = 2.0
-"""Distance over the sum of the radii up to which it is looked whether links pass each other in an increment."""
-
 DISTURBED = 0.005
 """Rotations, rad, by which the links of an answer are disturbed."""
 
@@ -124,19 +121,6 @@ class MemberChain(Chain):
         gap = np.linalg.norm(y, axis=1) - distance[near]
         deep = gap < 0.0
         return near[deep], gap[deep], s[deep], t[deep]
-
-    def passed(self, before: ChainState, after: ChainState) -> bool:
-        """Whether links that were near to each other are on the other side of each other."""
-        rows = np.array(self.link_rows)
-        ways = [(self.points(state)[rows], self.directions(state)[0]) for state in (before, after)]
-        (x, d), _ = ways
-        middle = x + 0.5 * self.lengths[:, None] * d
-        reach = NEAR * self.distance + 0.5 * (self.lengths[self.one] + self.lengths[self.other])
-        near = np.flatnonzero(np.linalg.norm(middle[self.one] - middle[self.other], axis=1) < reach)
-        i, j = self.one[near], self.other[near]
-        s, t = _closest(x[i], d[i], self.lengths[i], x[j], d[j], self.lengths[j])
-        first, then = (x[i] + s[:, None] * d[i] - x[j] - t[:, None] * d[j] for x, d in ways)
-        return bool((np.einsum("ni,ni->n", first, then) < 0.0).any())
 
     def potential(self, state: ChainState, s: float, width: float, barrier: bool = False) -> float:
         """Energy of springs and loads; with the barrier infinite where links enter each other by its width."""
