@@ -718,13 +718,7 @@ def test_ring_is_flattened_on_a_floor():
     assert force > point.contacts["floor"]["force"][1]
 
 
-@pytest.mark.parametrize(
-    ("element", "elements", "tolerance"),
-    [
-        ("SFET2", 200, 1.0 / 200),
-        ("SFET3", 40, 0.02 / 40),
-    ],
-)
+@pytest.mark.parametrize(("element", "elements", "tolerance"), [("SFET2", 200, 1.0 / 200), ("SFET3", 40, 0.02 / 40)])
 def test_coarse_elements_know_contact_as_well(element, elements, tolerance):
     one = solve(made(CASES["wrapped"])).last.contacts["floor"]
     other = solve(made(CASES["wrapped"]), element=element, elements=elements).last.contacts["floor"]

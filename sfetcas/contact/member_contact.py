@@ -41,7 +41,7 @@ from .gripping import CENTRED, FIRM, Gripping, Placed
 from .lines import LINE, SHORT_LINE, Lines, Points, begun, ends_of, points_of
 from .pairs import ONE, Near, Pair, PairKey
 
-__all__ = ["FITS", "MemberContact", "Way"]
+__all__ = ["FITS", "LESS", "MORE", "MemberContact", "Way"]
 
 Way = Callable[[Model], Loading]
 """The loading of a model."""

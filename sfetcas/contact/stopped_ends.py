@@ -26,7 +26,7 @@ from ..solvers.one_sided import OneSided
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
 from .lines import Points, begun, points_of
-from .member_contact import MemberContact, Way
+from .member_contact import LESS, MORE, MemberContact, Way
 from .pairs import Pair
 
 __all__ = ["StoppedEnds", "brought_in", "stops_ends"]
@@ -135,11 +135,11 @@ class StoppedEnds:
             found = self._corrected(system, state, Limits(iterations=STEPS))
             turned = float(np.abs(turned_between(found.equations, found.state, state, near=True)).max(initial=0.0))
             if not found.converged or turned > STRIDE:
-                drag *= 4.0
+                drag *= MORE
                 if drag > MOST_DRAG * max(deep, 1.0):
                     break
                 continue
-            state, acting, drag, part = found.state, system.acting, 0.3 * drag, ahead
+            state, acting, drag, part = found.state, system.acting, LESS * drag, ahead
             if turned < STILL and drag < DRAG and part == 1.0:
                 break
         return self._without(state)

@@ -156,7 +156,7 @@ def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
 
 
 PLACED = 1e-9
-"""Change of a place of contact in a step, a fraction of the length of its member, up to which it is where it is."""
+"""Change in a step, over the unit of length, up to which a place that slides along a member is where it is."""
 
 
 class System(Protocol):
