@@ -357,9 +357,9 @@ class Sheet:
         left_out = len(self._labels()) - len(self._placed([]))
         if left_out:
             self._tell_left_out(left_out)
-            self.figure.draw_without_rendering()
-            self._fit()
-            self.figure.draw_without_rendering()
+            self._laid_out()
+            self._fit(self._content())
+            self._laid_out()
         self.drawn += [self.draw(mark) for mark in self.sketch.marks]
         placed = self._placed(self._gravity(gravity))
         self._tell_left_out(len(self._labels()) - len(placed))
@@ -367,28 +367,42 @@ class Sheet:
             self._write(box.centre, label.text, label.colour, label.name)
 
     def _fit_drawn(self) -> None:
-        """Fit the axes until that changes little, and leave them drawn."""
-        self.figure.draw_without_rendering()
-        if self.axes is self.paper:
-            # Where nothing but limits changes nothing need be drawn; other tick labels change the layout once more.
-            for _ in range(2):
-                for _ in range(4):
-                    self._fit()
-                laid = np.array(self.axes.get_window_extent().extents)
-                self.figure.draw_without_rendering()
-                if np.abs(np.array(self.axes.get_window_extent().extents) - laid).max() < UNSEEN:
-                    break
+        """Fit the axes until that changes little, and leave them laid out."""
+        self._laid_out()
+        if self.axes is not self.paper:
+            # What else is laid out axes in space do not change.
+            self._fitted(6)
             return
-        # Ticks in space stand where they were drawn last; what else is laid out they do not change.
-        layout = self.figure.get_layout_engine()
-        self.figure.set_layout_engine("none")
-        for _ in range(6):
-            before = self._content()
-            self._fit()
-            self.figure.draw_without_rendering()
-            if np.abs(self._content() - before).max() < UNSEEN:
+        # Where nothing but limits changes the layout stays; other tick labels change it once more.
+        for _ in range(2):
+            self._fitted(4)
+            laid = np.array(self.axes.get_window_extent().extents)
+            self._laid_out()
+            if np.abs(np.array(self.axes.get_window_extent().extents) - laid).max() < UNSEEN:
                 break
-        self.figure.set_layout_engine(layout)
+
+    def _fitted(self, times: int) -> None:
+        """Fit the axes to what is on them until that changes little, so many times at most."""
+        content = self._content()
+        for _ in range(times):
+            before = content
+            self._fit(before)
+            self._place_ticks()
+            content = self._content()
+            if np.abs(content - before).max() < UNSEEN:
+                break
+
+    def _laid_out(self) -> None:
+        """Give all parts of the figure their places, without drawing them."""
+        layout = self.figure.get_layout_engine()
+        if layout is not None:
+            layout.execute(self.figure)
+        self._place_ticks()
+
+    def _place_ticks(self) -> None:
+        """Ticks in space stand where they were drawn last: draw them."""
+        if self.axes is not self.paper:
+            self.axes.draw(self._renderer())
 
     def _tell_left_out(self, count: int) -> None:
         text = f"{count} values are not written for lack of room; the largest are" if count else ""
@@ -425,8 +439,8 @@ class Sheet:
         margin = 9.0 * self._point()
         return np.array([pixels.min(axis=0) - margin, pixels.max(axis=0) + margin])
 
-    def _fit(self) -> None:
-        content = self._content()
+    def _fit(self, content: Array) -> None:
+        """Fit the axes to corners (2, 2) in pixels of what is on them."""
         if self.axes is self.paper:
             self._fit_plane(content)
         else:
