@@ -26,7 +26,7 @@ from matplotlib.figure import Figure
 
 from sfetcas import Analysis, Contact, CrossSection, Equilibrium, History, Load, Member, Motion, Node, Scene, solve
 
-RADIUS, LENGTH, PULL, TURNS, ASIDE = 0.03, 1.0, 20.0, 3.4, 0.5
+RADIUS, LENGTH, PULL, TURNS, ASIDE = 0.03, 1.0, 20.0, 3.6, 0.5
 """m, m, N, turns, and a small force in the middle, N, that says to which side it snaps."""
 
 STIFFNESS = 1.0

@@ -10,7 +10,9 @@ from scipy.optimize import root
 from benchmarks.member_checks import wrong_contacts
 from benchmarks.member_scenes import member_scene
 from sfetcas import Scene, SceneError, SolveError, load, solve
+from sfetcas.contact import member_contact
 from sfetcas.contact.member_contact import MemberContact
+from sfetcas.mechanics.equations import Equations
 
 RADIUS = 0.01
 
@@ -75,6 +77,24 @@ def test_the_end_of_a_member_below_another_one_by_shooting(dimension):
     assert touch["at"] == pytest.approx(at, abs=1e-6)
     assert np.linalg.norm(touch["force"]) == pytest.approx(push, rel=1e-5)
     assert step.certificate.stable is (dimension == "plane")
+
+
+def test_places_slide_by_short_steps(monkeypatch):
+    """Longer ones are shortened, and lead to the same place."""
+    moved, slid = Equations.moved, []
+
+    def recorded(equations, state, step):
+        slid.append(np.abs(step[equations.slid_places]).max(initial=0.0))
+        return moved(equations, state, step)
+
+    monkeypatch.setattr(Equations, "moved", recorded)
+    found = [(solve(leaves()).last.contacts["pair"], max(slid), slid.clear())[:2]]
+    monkeypatch.setattr(member_contact, "SLIDES", 1e-3)
+    found.append((solve(leaves()).last.contacts["pair"], max(slid)))
+    assert found[0][1] > 2e-3
+    assert found[1][1] <= 1e-3 * (1.0 + 1e-12)
+    assert found[1][0]["at"] == pytest.approx(found[0][0]["at"], abs=1e-9)
+    np.testing.assert_allclose(found[1][0]["force"], found[0][0]["force"], rtol=1e-9, atol=1e-9)
 
 
 def penetration(step, pairs):

@@ -13,6 +13,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -60,8 +61,10 @@ SOFTENED, LEAST_SOFTENED = 0.125, 1e-3
 SLIPPED = 1e-6
 """Share of the limit of friction from which on a place slides on, and by which length, dimensionless."""
 
-TURN, ITERATIONS, ACROSS = 0.6, 30, 12
-"""Largest rotation of a node in a step of Newton's method but the first, rad, and steps at most, also across a
+TURN, SLIDES, ITERATIONS, ACROSS = 0.6, 0.02, 30, 12
+"""Largest rotation of a node in a step of Newton's method but the first, rad, and way of a place of contact, over
+the unit of length: where members hardly bend away from what they touch it would go past the other places, and rods that
+wind up were lost where one more begins to touch; half as much takes too many steps.  Steps at most, also across a
 direction, where shorter steps along a path are another way.
 """
 
@@ -376,7 +379,8 @@ class MemberContact:
 
     def _by_newton(self, system: OneSided, state: State, factor: float) -> Converged:
         """Newton's method from a near state."""
-        limits = Limits(iterations=ITERATIONS if self.across is None else ACROSS, most=TURN, contraction=2.0)
+        iterations = ITERATIONS if self.across is None else ACROSS
+        limits = Limits(iterations=iterations, most=TURN, slides=SLIDES, contraction=2.0)
         with np.errstate(over="ignore", invalid="ignore"):
             return correct(system, state, factor=factor, limits=limits)
 
@@ -433,7 +437,8 @@ class MemberContact:
             if self.across is not None:
                 curve, along = self.across(prepared)
                 return curve.corrected(state, source.factor, along)
-            found = prepared.correct(state, loading, iterations=ITERATIONS, most=TURN, contraction=2.0, drag=resisting)
+            limits: dict[str, Any] = {"iterations": ITERATIONS, "most": TURN, "slides": SLIDES, "contraction": 2.0}
+            found = prepared.correct(state, loading, drag=resisting, **limits)
         good = found.converged or found.residual <= tolerances.BALANCED
         return found if good else None
 

@@ -263,6 +263,9 @@ class Limits:
         Largest number of steps.
     most : float
         Largest rotation of a node in any step but the first, rad.
+    slides : float
+        Largest way along a member by which a place of contact moves in a step, over the unit of length: longer steps
+        are shortened to that.
     contraction, short : float
         A step longer than ``short``, rad, must not exceed ``contraction`` times the one before.
     turned : float
@@ -275,6 +278,7 @@ class Limits:
 
     iterations: int = 12
     most: float = np.inf
+    slides: float = np.inf
     contraction: float = 1.0
     short: float = 0.05
     turned: float = np.inf
@@ -354,7 +358,10 @@ class _Correction:
         return exact or self.system.suffices(here)
 
     def after(self, here: Balance, step: Array) -> Balance | None:
-        limits, length = self.limits, largest_rotation(self.equations, step)
+        limits = self.limits
+        slid = float(np.abs(step[self.equations.slid_places]).max(initial=0.0))
+        step = step * min(1.0, limits.slides / max(slid, TINY))
+        length = largest_rotation(self.equations, step)
         self.lengths.append(length)
         grows = length > limits.most or length > max(limits.contraction * here.length, limits.short)
         if sum(self.lengths) > limits.turned or (here.count and here.residual > self.tolerance and grows):
@@ -370,7 +377,7 @@ class _Correction:
             return None
         if there.residual > 0.25 * here.residual and self._low(here):
             # Where a line ends is known to the root of the residual only: what is left of that goes in a further step.
-            if not here.stalls and np.abs(step[self.equations.slid_places]).max(initial=0.0) > PLACED:
+            if not here.stalls and slid > PLACED:
                 return replace(there, stalls=True)
             return replace(there if there.residual < here.residual else here, over=True)
         return there
