@@ -3,6 +3,7 @@
 import ctypes
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +12,11 @@ from test_codegen import built, needs_compiler, said
 from test_contact_design import DRUM, FLOOR, pressed, two
 from test_member_contact import leaves
 
-from sfetcas import Scene, SceneError, export, solve
+from sfetcas import Scene, SceneError, SolveError, export, load, solve
 from sfetcas.parametric.equilibrium import equilibrium_solver
 from sfetcas.solvers.globalised import Code
 
+ROOT = Path(__file__).parent.parent
 LOADS = {"arguments": ["loads.F.value"]}
 
 
@@ -103,6 +105,39 @@ def test_members_that_touch_each_other_are_looked_at_too():
             near = outcome.state
             # Places are within elements of the mesh of the default load.
             np.testing.assert_allclose(solver.by_name(results)["nodes.a1.position"], step.position("a1"), atol=1e-6)
+
+
+def test_thin_rods_that_cross_do_not_touch_themselves():
+    """Thinner than it is from one place that is looked at to the next."""
+    table = {
+        "sections": {"rod": {"shape": "circle", "radius": 0.005, "E": 1e8, "nu": 0.3}},
+        "nodes": {
+            "A1": {"position": [-0.5, 0, 0], "support": "clamped"},
+            "A2": {"position": [0.5, 0, 0]},
+            "B1": {"position": [0.1, -0.5, 0.02], "support": "clamped"},
+            "B2": {"position": [0.1, 0.5, 0.02]},
+        },
+        "members": {
+            "lower": {"nodes": ["A1", "A2"], "section": "rod"},
+            "upper": {"nodes": ["B1", "B2"], "section": "rod"},
+        },
+        "loads": {"down": {"type": "force", "node": "B2", "value": [0, 0, -0.05]}},
+        "contacts": {"cross": {"type": "members", "members": ["upper", "lower"]}},
+        "analysis": {"accuracy": 1e-6},
+    }
+    scene = Scene.from_dict(table)
+    solver = solver_of(scene, arguments=["factor"])
+    outcome, results = solver.solve()
+    assert outcome.code is Code.SOLVED
+    np.testing.assert_allclose(
+        solver.by_name(results)["nodes.B2.position"], solve(scene).last.position("B2"), rtol=0, atol=1e-6
+    )
+
+
+def test_what_is_not_found_for_the_arguments_of_the_scene_is_not_written(tmp_path):
+    """Ropes, which hardly bend, are lost by the solver in C even where they are."""
+    with pytest.raises(SolveError, match="for the arguments of the scene: no equilibrium within the iterations"):
+        export(load(ROOT / "problems" / "ropes_crossing.toml"), tmp_path / "ropes")
 
 
 def test_members_that_cross_are_seen_as_near_as_they_are():

@@ -18,7 +18,7 @@ from ..equilibria.single import solved_from
 from ..equilibria.solution import Equilibrium
 from ..equilibria.statics import solve
 from ..equilibria.stops import solve_stopped
-from ..errors import SceneError, SolveError
+from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.accuracy import every_other
 from ..mechanics.contact_points import undeformed_vectors
@@ -26,7 +26,7 @@ from ..mechanics.equations import State
 from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
-from ..solvers.globalised import Code, Globalised, Outcome, Rules
+from ..solvers.globalised import MEANINGS, Code, Globalised, Outcome, Rules
 from ..solvers.prepared import Prepared, Solved
 from .arguments import Arguments, Asked, asked_for, in_words
 from .results import Results, default_results
@@ -276,6 +276,8 @@ def equilibrium_solver(
     ------
     SceneError
         A scene that cannot be exported, a number or a result that it does not have.
+    SolveError
+        The solver does not find what touches for the arguments of the scene.
     """
     check_scene(scene, "export({}, ...)", steps=False)
     refuse_search(scene, stopped=stopped, touching=touching)
@@ -304,8 +306,18 @@ def equilibrium_solver(
     if mesh.points:
         # What touches does so near its answer alone.
         begun = in_contact(kept_of(scene, settings or Settings(), solved_from(answer)), solver.model)
-        return replace(solver, start=known.program.flat(begun), begun=known.defaults)
+        solver = replace(solver, start=known.program.flat(begun), begun=known.defaults)
+        return _found(solver) if watched else solver
     return solver if start is not None or _same(solver) else replace(solver, start=_answered(solver))
+
+
+def _found(solver: EquilibriumSolver) -> EquilibriumSolver:
+    """The solver, if it finds what touches for the arguments of the scene."""
+    outcome, _ = solver.solve()
+    if outcome.code not in SOLVED:
+        detail = f"the solver that would be written says for the arguments of the scene: {MEANINGS[outcome.code]}"
+        raise SolveError(Status.FAILED, detail)
+    return solver
 
 
 def _answered(solver: EquilibriumSolver) -> Array:

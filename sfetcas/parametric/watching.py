@@ -173,12 +173,15 @@ def _gaps(base: Model, contact: str, here: ca.MX) -> ca.MX:
 
 
 def _next_to(nearby: Nearby, number: int, x: Array) -> Array:
-    """Whether places (n, n) at fractions (n,) of both members of a pair are too near along these to touch, of bool."""
+    """Whether places (n, n) at fractions (n,) of both members of a pair, or those beside them, as which a parabola sees
+    them, are too near along these to touch, of bool.
+    """
     s, t = (part.ravel() for part in np.meshgrid(x, x, indexing="ij"))
     a, b = (nearby.lines.members.index(member) for member in nearby.pairs[number].members)
     whole = np.full(len(s), number)
     found = nearby.apart(Places(whole, nearby.lines.at(a, s), nearby.lines.at(b, t), whole))
-    return ~found.reshape(len(x), len(x))
+    next_to = np.pad(~found.reshape(len(x), len(x)), 1)
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(next_to, (3, 3)).any(axis=(2, 3)))
 
 
 def _squares(one: ca.MX, other: ca.MX) -> Iterator[tuple[ca.MX, slice, slice]]:
