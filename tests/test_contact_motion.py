@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import sfetcas
-from sfetcas import SceneError, dump, solve
+from sfetcas import Scene, SceneError, dump, solve
 from sfetcas.cli import main
 from sfetcas.dynamics.impacts import Collision
 from sfetcas.mechanics.mesh import uniform_mesh
@@ -518,3 +518,54 @@ def test_what_needs_smooth_equations_is_refused(tmp_path):
     ):
         with pytest.raises(SceneError, match="contact is found by a search"):
             refused()
+
+
+def beam_on_pegs(**analysis):
+    """A beam that falls level on two pegs, at a fifth of its length from both ends, and bounces."""
+    peg = {"type": "circle", "radius": 0.05, "members": "all", "restitution": 0.5}
+    return Scene.from_dict(
+        {
+            "gravity": [0, -9.81],
+            "sections": {"strip": {"EI3": 5.0, "rhoA": 0.5, "damping": 0.002}},
+            "nodes": {"A": {"position": [-0.5, 0.3]}, "B": {"position": [0.5, 0.3]}},
+            "members": {"beam": {"nodes": ["A", "B"], "section": "strip"}},
+            "contacts": {"left": {**peg, "center": [-0.3, 0]}, "right": {**peg, "center": [0.3, 0]}},
+            "analysis": {"type": "dynamic", "end": 0.26, "accuracy": 1e-2, **analysis},
+        }
+    )
+
+
+def test_what_an_impact_sets_swinging_is_not_damped_by_a_long_step():
+    """It leaves the pegs again, as in short equal steps; so long a step as in free fall left it lying there."""
+    motion = solve(beam_on_pegs())
+    other = solve(beam_on_pegs(step=1e-3), elements=20)
+    for found in (motion, other):
+        assert not np.any(found.last.contacts["left"]["touching"])
+    assert other.last.position("A")[1] > 0.06
+    np.testing.assert_allclose(motion.last.position("A"), other.last.position("A"), rtol=0, atol=1e-2)
+
+
+def deepest(motion):
+    """How deep a straight member is inside of the floor at most, seen at many places along it."""
+    x = np.linspace(0.0, 1.0, 65)
+    return max(-float(step.along("m", x)["position"][:, 1].min()) for step in motion.steps)
+
+
+def test_in_steps_that_are_given_flexible_members_do_not_sink_into_obstacles():
+    """Between ends of elements nothing stops them: elements are halved there."""
+    table = {
+        "gravity": [0, -10],
+        "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
+        "nodes": {"A": {"position": [0, 0.1]}, "B": {"position": [0.8, 0.7]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "contacts": {"f": {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}},
+        "analysis": {"type": "dynamic", "end": 0.3, "accuracy": 5e-3, "integrator": "stepping", "step": 4e-3},
+    }
+    scene = Scene.from_dict(table)
+    motion = solve(scene)
+    assert deepest(motion) < 6e-3 * scene.size
+    assert not motion.notes
+    few = solve(scene, elements=2)
+    # What is prescribed stays, and is told.
+    assert deepest(few) > 3e-2
+    assert any("contacts.f, which stops ends of elements" in note for note in few.notes)

@@ -376,7 +376,7 @@ def integrate(
     SolveError
         A step does not converge; the steps before have been given.
     """
-    given = first
+    begins = first
     for end in breaks:
         while end > memory.t:
             going: _Fixed | _Adaptive
@@ -395,9 +395,11 @@ def integrate(
             if passed is not None and passed.over:
                 return
             # Of two first steps each is half as long as what is tried: event by event they would become ever shorter.
-            started = first
-            first = going.h if passed is None or going.h is None else max(LONGER * going.h, LONGER * SHORTEST)
-            if passed is not None and given is not None: first=min(first, given)
+            if passed is None or going.h is None:
+                first = going.h
+            else:
+                # Longer ones would damp what an event sets swinging before it is seen.
+                first = min(max(LONGER * going.h, LONGER * SHORTEST), np.inf if begins is None else begins)
             if passed is None or end - memory.t <= tolerances.DECIMAL * end:
                 break
     for _ in range(BEYOND):

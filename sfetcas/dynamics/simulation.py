@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -13,6 +13,8 @@ import casadi as ca
 import numpy as np
 
 from .. import tolerances
+from ..contact.closest import Closest
+from ..contact.pairs import Near
 from ..description.scene import Scene
 from ..description.sections import HEAVY
 from ..equilibria.meshing import WHERE, Meshing
@@ -105,7 +107,7 @@ def simulate(scene: Scene, settings: Settings, progress: Callable[[float], Any] 
 @dataclass
 class MeshRun:
     """The result of one run on one mesh: states, number of steps, largest errors of constraints and norms, notes,
-    times, steps, events.
+    times, steps, events, and where members dip into obstacles by more than is accepted, with the times.
     """
 
     instants: list[MotionState]
@@ -118,6 +120,7 @@ class MeshRun:
     interrupted: bool = False
     record: StepRecord | None = None
     events: tuple[StopEvent, ...] = ()
+    dips: tuple[tuple[float, Near], ...] = ()
 
 
 class Simulation:
@@ -244,8 +247,22 @@ class Simulation:
         run.count, run.gap, run.norm, run.record = integrator.count, integrator.gap, integrator.norm, integrator.record
         ended = run.instants[-1].time if run.instants else 0.0
         run.events = tuple(event for event in map(mover.event, integrator.events) if event.time <= ended)
+        run.dips = tuple(self._dips(run.instants))
         self.seconds["solve"] += time.perf_counter() - solving
         return run
+
+    @functools.cached_property
+    def _closest(self) -> Closest:
+        return Closest(self.scene, 0.1 * self.accuracy)
+
+    def _dips(self, instants: list[MotionState]) -> Iterator[tuple[float, Near]]:
+        """Where members dip into obstacles by more than the accuracy, between ends of elements, where nothing stops
+        them, and when.
+        """
+        stopping = [pair for pair in self._closest.pairs.values() if pair.stop is not None and not pair.edge]
+        for instant in instants if stopping else ():
+            found = self._closest.found(instant.fields, -self.accuracy * self.scene.size, stopping)
+            yield from ((instant.time, near) for near in found)
 
     @functools.cached_property
     def weightless(self) -> bool:
@@ -348,12 +365,18 @@ class Simulation:
             mesh = ending_at(self.scene, mesh, ((e["member"], at) for e in entries for at in np.atleast_1d(e["at"])))
         apart: float | None = None
         run = self.run(mesh, 0)
+        for _ in range(0 if analysis.step is None or self.prescribed else ROUNDS):
+            # In steps that are given runs on finer meshes need not agree, but members must not dip into obstacles.
+            if not run.dips or run.interrupted or run.failure is not None:
+                break
+            mesh = self._without_dips(mesh, run)
+            run = self.run(mesh, 0)
         for rounds in range(1, 1 + ROUNDS if analysis.step is None else 1):
             failed = run.failure is not None
             bent = run.failure is not None and run.failure.status in LIMITS
             if run.interrupted or bent or (failed and (self.prescribed or rounds > RESCUES)):
                 break
-            mesh = mesh if self.prescribed else mesh.refined()
+            mesh = mesh if self.prescribed else self._ending_at(mesh.refined(), run)
             finer = self.run(mesh, rounds, run.count)
             if failed:
                 # What a coarse mesh cannot follow a finer one may.
@@ -368,11 +391,33 @@ class Simulation:
             apart, run = self._difference(run, finer), finer
             # Fronts that cross elements, and instants of yield within steps, leave no order by which errors fall.
             error = apart if self.scene.remembers else left(apart, before, self.accuracy)
+            error = max(error, self._deepest(run))
             if error <= self.accuracy:
                 break
-        if error is not None and apart is not None and error > max(self.accuracy, apart):
+        if error is not None and apart is not None and error > max(self.accuracy, apart, self._deepest(run)):
             run.notes = (*run.notes, SENSITIVE)
         return self._answer(run, error)
+
+    def _without_dips(self, mesh: Mesh, run: MeshRun) -> Mesh:
+        """A mesh whose elements are halved where members dip into obstacles, and end at round ones where they do."""
+        marks = {name: np.zeros(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
+        for _, near in run.dips:
+            cuts = mesh.cuts[near.members[0]]
+            marks[near.members[0]][np.clip(np.searchsorted(cuts, near.at[0]) - 1, 0, len(cuts) - 2)] = True
+        return self._ending_at(mesh.refined(marks), run)
+
+    def _ending_at(self, mesh: Mesh, run: MeshRun) -> Mesh:
+        """The mesh with ends of elements where members are deepest in round obstacles."""
+        deepest = dict[Any, Near]()
+        for _, near in run.dips:
+            stop = self._closest.pairs[near.pair].stop
+            if stop is not None and stop.kind == "round" and near.gap < getattr(deepest.get(near.pair), "gap", 0.0):
+                deepest[near.pair] = near
+        return ending_at(self.scene, mesh, ((near.members[0], near.at[0]) for near in deepest.values()))
+
+    def _deepest(self, run: MeshRun) -> float:
+        """How deep members dip into obstacles where that is more than is accepted, over the size."""
+        return max((-near.gap for _, near in run.dips), default=0.0) / self.scene.size
 
     def _difference(self, coarse: MeshRun, fine: MeshRun) -> float:
         """How far runs are apart: distances of nodes and middles of members, over the size of the scene."""
@@ -438,7 +483,13 @@ class Simulation:
             error_estimate=error,
             error_of="" if self.quantity is None else self.quantity.text,
             violation={"norms": run.norm, "closings": run.gap},
-            notes=(*run.notes, *self._unlikely(run), *self._superelement_notes(run), *self._law_notes(run)),
+            notes=(
+                *run.notes,
+                *self._unlikely(run),
+                *self._dip_notes(run),
+                *self._superelement_notes(run),
+                *self._law_notes(run),
+            ),
             failure="" if run.failure is None else run.failure.detail,
             record=run.record,
             events=run.events,
@@ -448,6 +499,14 @@ class Simulation:
                 run.failure.reached = motion
             raise run.failure
         return motion
+
+    def _dip_notes(self, run: MeshRun) -> tuple[str, ...]:
+        """Where members dip into obstacles the deepest, of all by more than is accepted."""
+        if not run.dips:
+            return ()
+        when, near = min(run.dips, key=lambda dip: dip[1].gap)
+        where = f"members.{near.members[0]} at {near.at[0]:.3g} of its length is {-near.gap:.3g} m inside"
+        return (f"at {when:.6g} s {where} contacts.{near.contact}, which stops ends of elements: take more of them",)
 
     def _superelement_notes(self, run: MeshRun) -> tuple[str, ...]:
         """Notes of small members where they bend most beyond linear elasticity."""
