@@ -240,3 +240,13 @@ def test_a_fit_in_contact_finds_the_stiffness():
 def test_refused(parts, answers, sentence):
     with pytest.raises(SceneError, match=sentence):
         parametric(Scene.from_dict(parts), ["factor"], answers)
+
+
+def test_radius_of_a_drum_on_which_a_member_begins():
+    """Larger ones are refused, smaller ones are not."""
+    parts = pressed_on({"type": "circle", "center": [0.4, -0.2], "radius": 0.2})
+    scene = Scene.from_dict({**parts, "analysis": {"accuracy": 1e-8}})
+    found = parametric(scene, ["contacts.c.radius"], ["nodes.B.position"]).solve()
+    smaller = solve(scene.replace({"contacts.c.radius": 0.2 - 1e-5})).last.position("B")
+    slope = found.jacobian["nodes.B.position"]["contacts.c.radius"]
+    np.testing.assert_allclose((found["nodes.B.position"] - smaller) / 1e-5, np.ravel(slope), atol=2e-3)

@@ -422,6 +422,20 @@ def test_answer_by_name():
     assert value_of(step, "contacts.floor.force")[1] == entry["force"][1]
 
 
+FLAT = {"type": "plane", "point": [0, 0], "normal": [0, 1]}
+
+
+@pytest.mark.parametrize("length", [1e-200, 5e-324, 1e200])
+def test_directions_may_have_any_length(length):
+    """Squares of their components have none."""
+    places = []
+    for normal in ([0, 1], [0, length]):
+        floor = {**FLAT, "normal": normal, "member": "m"}
+        places.append(solve(made(above(0.2, contact=floor, loads=weight(20.0)))).last.position("B"))
+    assert places[1][1] > -1e-6
+    np.testing.assert_allclose(places[1], places[0], rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("contact", "message"),
     [
@@ -441,6 +455,14 @@ def test_answer_by_name():
         ({"type": "circle", "center": [0, -1], "radius": -0.1, "member": "m"}, "radius: found -0.1"),
         ({"type": "plane", "point": [0, 0], "normal": [0, 0], "member": "m"}, "normal: found"),
         ({"type": "wall", "point": [0, 0], "member": "m"}, "type: found 'wall', accepted"),
+        ({**FLAT, "members": []}, "members: found no member, accepted: names of members, each once, or 'all'"),
+        ({**FLAT, "members": ["m", "m"]}, "members: found a member twice"),
+        ({**FLAT, "members": [5]}, "contacts.floor.members.0: found 5, accepted: a text"),
+        ({**FLAT, "member": "m", "side": [2, 1e-9]}, "side: found [2.0, 1e-09, 0.0], which is along the plane"),
+        (
+            {"type": "point", "position": [0.5, 0.1], "side": [0, 0], "member": "m"},
+            "contacts.floor.side: found [0.0, 0.0, 0.0], accepted: a direction",
+        ),
     ],
 )
 def test_wrong_contacts_are_refused(contact, message):

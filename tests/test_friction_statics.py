@@ -72,6 +72,36 @@ def test_the_report_tells_friction_and_whether_it_holds(tmp_path, capsys):
     ]
 
 
+def test_steps_before_one_that_slips_are_kept():
+    """Each step goes on from the one before, and needs none after it."""
+    with pytest.raises(SolveError, match=r"at factor 2: .* about to slide: .*; 2 steps before it solved") as told:
+        solve(block(0.3, 0.5, steps=(0.5, 1.0, 2.0, 3.0), spring=False))
+    kept = told.value.reached.steps
+    assert [step.factor for step in kept] == [0.5, 1.0]
+    np.testing.assert_allclose([step.contacts["floor"]["friction"][0] for step in kept], [-0.25, -0.5], atol=1e-9)
+
+
+def test_members_that_slide_off_the_end_of_others_do_not_slip_there():
+    """Where the end of the upper one ceases to be nearest friction next to none is as none."""
+    found = []
+    for friction in (0.0, 1e-9):
+        table = {
+            "sections": {"s": {"EI3": 1.0}},
+            "nodes": {
+                "A": {"position": [0, 0.1], "support": "clamped"},
+                "B": {"position": [1, 0.1]},
+                "C": {"position": [0.3, 0], "support": "clamped"},
+                "D": {"position": [1.3, 0]},
+            },
+            "members": {"u": {"nodes": ["A", "B"], "section": "s"}, "l": {"nodes": ["C", "D"], "section": "s"}},
+            "loads": {"w": {"type": "force", "node": "B", "value": [0, -3]}},
+            "contacts": {"c": {"type": "members", "members": ["u", "l"], "radius": 0.02, "friction": friction}},
+            "analysis": {"accuracy": 1e-3, "steps": [0.64]},
+        }
+        found.append(solve(Scene.from_dict(table)).last)
+    np.testing.assert_allclose(found[1].position("B"), found[0].position("B"), rtol=0, atol=1e-3)
+
+
 def test_how_far_a_force_can_go_before_what_it_pulls_slips_is_told():
     """Nothing but friction holds it: 0.6 of 1 N."""
     with pytest.raises(SolveError, match=r"where all that touches is about to slide: contacts\.floor") as told:

@@ -70,7 +70,9 @@ class Placed:
     def normal(self, i: int, stop: Obstacle | None) -> Array:
         """Unit normal (3,) at a point, on an obstacle or on the second member."""
         if stop is None:
-            return unit(self.vectors[i])
+            # Centre lines that cross, as none do that rest, may as well be on either side of each other.
+            across = (self.vectors[i], np.cross([0.0, 0.0, 1.0], self.tangents[i][0]), np.array([1.0, 0.0, 0.0]))
+            return unit(next(vector for vector in across if vector.any()))
         return np.asarray(stop.normals(self.places[i][0][None], self.tangents[i][0][None])[0])
 
 

@@ -10,8 +10,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, model_validator
 
+from .. import tolerances
 from ..errors import SceneError
-from ..mathematics.arrays import numbers, values_of
+from ..mathematics.arrays import numbers, unit, values_of
 from .records import Direction, Positive, Record, Vector, listed, number, say
 from .sections import CrossSection
 from .structure import Member
@@ -60,8 +61,9 @@ class Contact(Record):
     Parameters
     ----------
     type : text
-        ``point`` (in plane scenes), ``line``, ``plane``, ``circle``, ``cylinder`` or ``sphere``; ``members`` where
-        members of round section touch each other and, where they are flexible, themselves.
+        ``point`` (in plane scenes), ``line``, ``plane``, ``circle`` (in space a cylinder along z), ``cylinder``
+        or ``sphere``; ``members`` where members of round section touch each other and, where they are flexible,
+        themselves.
     position : (3,), m
         Of a point that members slide over.
     point : (3,), m
@@ -122,9 +124,15 @@ class Contact(Record):
             raise SceneError(f"not accepted: {what}", (key,))
         if (self.member is None) == (self.members is None):
             raise SceneError("accepted: either member or members, one of them")
+        if isinstance(self.members, tuple) and len(set(self.members)) != max(1, len(self.members)):
+            found = "a member twice" if self.members else "no member"
+            raise SceneError(f"found {found}, accepted: names of members, each once, or 'all'", ("members",))
         if isinstance(self.side, str) != (self.type in ("circle", "cylinder", "sphere")) and self.side is not None:
             accepted = "a direction [x, y] or [x, y, z]" if isinstance(self.side, str) else "inside or outside"
             raise SceneError(f"found {say(self.side)}, accepted for a {self.type}: {accepted}", ("side",))
+        along = self.type == "plane" and isinstance(self.side, tuple) and self.normal is not None
+        if along and abs(unit(self.side) @ unit(self.normal)) < tolerances.PARALLEL:
+            raise SceneError(f"found {say(self.side)}, which is along the plane, accepted: out of it", ("side",))
         return self
 
     @property

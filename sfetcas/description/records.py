@@ -217,9 +217,17 @@ def turn(value: Any) -> float | tuple[float, float, float]:
 
 
 def _direction(value: tuple[float, float, float]) -> tuple[float, float, float]:
-    if not any(value):
+    largest = max(map(abs, value))
+    if not largest:
         raise ValueError(f"found {say(value)}, accepted: a direction, which is not of zero length")
-    return value
+    if SQUARED[0] < largest < SQUARED[1]:
+        return value
+    x, y, z = (each / largest for each in value)
+    return x, y, z
+
+
+SQUARED = 1e-100, 1e100
+"""Numbers between these have squares; only the direction of longer and shorter directions is kept."""
 
 
 def _fraction(value: float) -> float:
@@ -432,7 +440,12 @@ def _place(loc: tuple[int | str, ...], record: type[BaseModel]) -> tuple[str, ..
     """The keys on the way to a finding, without what pydantic adds to them."""
     field = record.model_fields.get(name_of(record, str(loc[0]))) if loc else None
     tagged = field is not None and _tagged(field)
-    return tuple(str(part) for part in (loc[:1] + loc[2:] if tagged else loc) if part != "[key]")
+    parts = (str(part) for part in (loc[:1] + loc[2:] if tagged else loc))
+    return tuple(part for part in parts if part != "[key]" and not part.startswith(SCHEMAS))
+
+
+SCHEMAS = ("function-", "tuple[", "list[", "literal[")
+"""How names begin that pydantic gives to one of several types of a key."""
 
 
 def _tagged(field: FieldInfo) -> bool:

@@ -1068,8 +1068,6 @@ def _check_between_members(scene: Scene, name: str) -> None:
     names = members_of(contact, scene.members)
     if contact.members == "all":
         names = [member for member in names if scene.members[member].type != "small"]
-    if len(names) != len(set(names)):
-        raise SceneError("found a member twice, accepted: each once", (*where, "members"))
     if not pairs_of(names, scene.members):
         message = f"found {enumerated(names) or 'no member'}, accepted: two members or more, or one that is flexible"
         raise SceneError(message, where)

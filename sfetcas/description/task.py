@@ -137,7 +137,7 @@ class Analysis(Record):
     steps : (n,)
         Load factors.  Each multiplies all loads, gravity and motions without a history, and gives an answer;
         histories are evaluated there.  Each is loaded from zero by itself, but with laws that have memory, with
-        friction of tendons and with insertion they are a way from one to the next.  On a path each crossing of one
+        friction and with insertion they are a way from one to the next.  On a path each crossing of one
         of these factors is an answer, in the order in which they are met.
     unstable : text
         ``leave`` an unstable equilibrium for a stable one, or ``stay``.

@@ -155,10 +155,10 @@ class MemberContactSteps:
 
     def _known(self, found: Solved | None) -> Solved:
         if found is None:
-            detail = "the loads growing from zero could not be followed while members touch each other"
-            raise SolveError(
-                Status.FAILED, f"{detail}: {', '.join(f'contacts.{name}' for name in self.scene.contacts)}"
-            )
+            contacts = self.scene.contacts
+            what = "each other" if any(one.between_members for one in contacts.values()) else "obstacles"
+            detail = f"the loads growing from zero could not be followed while members touch {what}"
+            raise SolveError(Status.FAILED, f"{detail}: {', '.join(f'contacts.{name}' for name in contacts)}")
         return found
 
     # -- accuracy -------------------------------------------------------------------------------
@@ -263,7 +263,7 @@ def refuse_unheld(scene: Scene, pilot: Prepared) -> None:
     _, sizes, ways = np.linalg.svd(free @ normals.T @ normals @ free.T)
     for way in ways[sizes < tolerances.PARALLEL**2]:
         names = ", ".join(f"contacts.{name}" for name in scene.contacts)
-        detail = f"nothing holds it along {along(unit(way @ free))}, not the frictionless {names}"
+        detail = f"nothing holds it along {along(unit(way @ free))}, as {names} only pushes across it"
         raise SolveError(Status.FAILED, detail)
 
 

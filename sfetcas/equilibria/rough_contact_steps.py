@@ -7,6 +7,7 @@ the length, until two sequences agree.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
@@ -53,6 +54,7 @@ class RoughContactSteps:
     def __init__(self, meshes: Meshing) -> None:
         self.meshes, self.scene = meshes, meshes.scene
         self.failed: tuple[float, list[Equilibrium]] = (0.0, [])
+        self._done = 0
 
     def answers(self, pilot: Prepared) -> list[Equilibrium]:
         """The equilibria of all steps.
@@ -61,14 +63,27 @@ class RoughContactSteps:
         ------
         SceneError, SolveError
             Members penetrate each other in the undeformed scene; a step has no equilibrium that could be found,
-            ``failed`` says which.
+            ``failed`` says which, and has those of the steps before.
         """
+        steps = self.scene.analysis.steps
+        try:
+            return self._answers(pilot, steps)
+        except SolveError:
+            factor, before = self.failed[0], steps[: self._done]
+            if before:
+                # They are what they are without the steps after them.
+                with contextlib.suppress(SolveError):
+                    self.failed = (factor, self._answers(pilot, before))
+                self.failed = (factor, self.failed[1])
+            raise
+
+    def _answers(self, pilot: Prepared, steps: Sequence[float]) -> list[Equilibrium]:
         target = self.meshes.target
         mesh = target if self.meshes.fixed else replace(pilot.model.mesh, order=target.order)
         before: list[Solved] = []
         errors: Sequence[float] = ()
         for level in range(LEVELS):
-            now, run, notes = self._sequence(mesh, level)
+            now, run, notes = self._sequence(mesh, level, steps)
             if before:
                 # Of first order where what slides is decided: what is left is not less than what the halving changed.
                 judged = [self.meshes.judged(unjudged(a), unjudged(b)) for a, b in zip(before, now, strict=True)]
@@ -84,8 +99,10 @@ class RoughContactSteps:
     def _large(found: Sequence[Solved]) -> bool:
         return found[-1].model.mesh.elements > MOST_ELEMENTS
 
-    def _sequence(self, mesh: Mesh, level: int) -> tuple[list[Solved], MemberContact, list[tuple[str, ...]]]:
-        """The states of all steps, followed from the undeformed scene, and notes on each."""
+    def _sequence(
+        self, mesh: Mesh, level: int, steps: Sequence[float]
+    ) -> tuple[list[Solved], MemberContact, list[tuple[str, ...]]]:
+        """The states of steps, followed from the undeformed scene, and notes on each."""
         run = MemberContact(self.scene, self.meshes.prepared, self.meshes.accuracy, self.meshes.fixed)
         run.stride, run.first = run.stride * 0.5**level, run.first * 0.5**level
         run.rough, run.lines.finer = run.rough * 0.1**level, 0.5**level
@@ -95,10 +112,10 @@ class RoughContactSteps:
         run.refuse_penetrating(zero.fields)
         now, last = run.lying(zero), 0.0
         found, notes = list[Solved](), list[tuple[str, ...]]()
-        self.failed = (0.0, [])
+        self.failed, self._done = (0.0, []), 0
         if self.scene.histories:
             now = self._known(run, run.follow(lambda t: lambda model: model.loading(0.0, t), now), 0.0, 0.0)
-        for factor in self.scene.analysis.steps:
+        for self._done, factor in enumerate(steps):
             self.failed = (factor, [])
             refuse_held_inside(self.scene, prepared, factor)
             told: tuple[str, ...] = (ORDER_MATTERS,)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -595,27 +596,40 @@ class Arguments:
     # -- the model with symbols -----------------------------------------------------------------------
 
     def _assembled(self, base: Model) -> Model:
-        """The model with symbols in the place of numbers."""
-        count, assembly = len(self._own), base.assembly
-        values = np.concatenate([self._generic(), self.places])
-        numbers_there = values.tolist(), Active(values, self._symbols).tolist()
-        plain, symbolic = (self._followed(each[:count]) for each in numbers_there)
+        """The model with symbols in the place of numbers.
+
+        Raises
+        ------
+        SceneError
+            It has none to either side of the defaults.
+        """
         try:
-            known = depending(with_numbers(self._scene, plain), symbolic) if count else self._scene
-            mesh = with_cuts(self._scene, base.mesh, symbolic, self._moved_ends(numbers_there[1][count:]))
-            return assemble(known, mesh, assembly=assembly, scales=base.scales)  # type: ignore[arg-type]
+            return self._assembled_near(base, 1.0)
         except SceneError as error:
+            # To one side a member may begin inside of the obstacle on which it lies.
+            with contextlib.suppress(SceneError):
+                return self._assembled_near(base, -1.0)
             raise SceneError(f"{error} (asked for by the arguments)") from None
 
-    def _generic(self) -> Array:
-        """Values near the defaults where nothing vanishes by chance, within their ranges."""
+    def _assembled_near(self, base: Model, side: float) -> Model:
+        """The model at values that are to a side of the defaults."""
+        count, assembly = len(self._own), base.assembly
+        values = np.concatenate([self._generic(side), self.places])
+        numbers_there = values.tolist(), Active(values, self._symbols).tolist()
+        plain, symbolic = (self._followed(each[:count]) for each in numbers_there)
+        known = depending(with_numbers(self._scene, plain), symbolic) if count else self._scene
+        mesh = with_cuts(self._scene, base.mesh, symbolic, self._moved_ends(numbers_there[1][count:]))
+        return assemble(known, mesh, assembly=assembly, scales=base.scales)  # type: ignore[arg-type]
+
+    def _generic(self, side: float) -> Array:
+        """Values near the defaults, to a side of these, where nothing vanishes by chance, within their ranges."""
         values = []
         ranges = [(one.low, one.high) for one in self.arguments for _ in one.default]
         for i in self._own:
             (low, high), default = ranges[i], float(self.defaults[i])
             share = NEAR * (1.0 + 0.3 * np.sin(1.0 + i))
             if low is None or high is None:
-                values.append(default + share * (default or self._scene.size))
+                values.append(default + side * share * (default or self._scene.size))
             else:
                 values.append(default + share * ((high if high - default > default - low else low) - default))
         return np.array(values)
