@@ -569,3 +569,30 @@ def test_in_steps_that_are_given_flexible_members_do_not_sink_into_obstacles():
     # What is prescribed stays, and is told.
     assert deepest(few) > 3e-2
     assert any("contacts.f, which stops ends of elements" in note for note in few.notes)
+
+
+@pytest.mark.parametrize("speed", [1e-6, 1e4])
+def test_what_nothing_pulls_moves_alike_at_any_speed(speed):
+    """A rough rod that hits a floor, without gravity: there is no unit of force but that of its own motion."""
+
+    def thrown(fast):
+        velocity = [fast, -fast]
+        return solve(
+            Scene.from_dict(
+                {
+                    "sections": {"s": {"rhoA": 1.0}},
+                    "nodes": {
+                        "A": {"position": [0, 0.1], "velocity": velocity},
+                        "B": {"position": [0.8, 0.7], "velocity": velocity},
+                    },
+                    "members": {"m": {"type": "rigid", "nodes": ["A", "B"], "section": "s"}},
+                    "contacts": {"f": {**FLOOR, "friction": 0.3}},
+                    "analysis": {"type": "dynamic", "end": 1.0 / fast, "accuracy": 1e-5},
+                }
+            )
+        )
+
+    other, slow = thrown(speed), thrown(1.0)
+    np.testing.assert_allclose([e.time * speed for e in other.events], [e.time for e in slow.events], rtol=1e-5)
+    np.testing.assert_allclose(other.last.position("A"), slow.last.position("A"), rtol=0, atol=1e-6)
+    assert other.last.energy["dissipated"] == pytest.approx(speed**2 * slow.last.energy["dissipated"], rel=1e-5)

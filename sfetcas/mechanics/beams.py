@@ -71,7 +71,9 @@ ELEMENT_DATA = ("stiffness", "tangent", "compliance")
 
 
 def scales_of(scene: Scene) -> Scales:
-    """Units for a scene, from its longest member and its largest stiffness (else from springs, else from loads)."""
+    """Units for a scene, from its longest member and its largest stiffness (else from springs, else from loads, else from
+    how fast it moves).
+    """
     length = max(line.length for line in scene.center_lines.values())
     x = np.linspace(0.0, 1.0, 5)
     found = []
@@ -86,7 +88,8 @@ def scales_of(scene: Scene) -> Scales:
     found = found or [spring.stiffness for spring in scene.springs.values() if spring.type == "rotational"]
     found = found or [spring.stiffness * length**2 for spring in scene.springs.values()]
     found = found or [tendon.stiffness * length**2 for tendon in scene.tendons.values() if tendon.stiffness is not None]
-    return Scales(length, max(found, default=0.0) or load_size(scene, length) or 1.0)
+    moment = max(found, default=0.0) or load_size(scene, length) or moving_size(scene, length) or 1.0
+    return Scales(length, moment)
 
 
 def load_size(scene: Scene, length: float) -> float:
@@ -102,14 +105,31 @@ def load_size(scene: Scene, length: float) -> float:
         for magnet in scene.magnets.values()
     ]
     forces += [abs(tendon.force) for tendon in scene.tendons.values() if not tendon.measured]
+    weight = 0.0 if scene.gravity is None else _heaviest(scene) * math.hypot(*scene.gravity)
+    return max([*(force * length for force in [*forces, weight]), *moments, *(q * length**2 for q in spread)])
+
+
+def moving_size(scene: Scene, length: float) -> float:
+    """Energy, N m, of what moves as fast at the begin as nothing else, or through a length, m, in the whole motion; zero
+    where nothing has a mass, and in statics.
+    """
+    if scene.analysis.type != "dynamic":
+        return 0.0
+    speeds = [math.hypot(*node.velocity) for node in scene.nodes.values() if node.velocity is not None]
+    spins = (member.spin for member in scene.members.values() if isinstance(member.spin, float | tuple))
+    speeds += [length * float(np.linalg.norm(np.atleast_1d(spin))) for spin in spins]
+    return _heaviest(scene) * (max(speeds, default=0.0) or length / scene.analysis.duration) ** 2
+
+
+def _heaviest(scene: Scene) -> float:
+    """The largest mass of a node or a member, kg."""
     masses = [node.mass for node in scene.nodes.values()]
     for name, member in scene.members.items():
         if member.section is not None:
             masses.append(
                 float(scene.sections[member.section].mass(np.array([0.5]))[0]) * scene.center_lines[name].length
             )
-    weight = 0.0 if scene.gravity is None else max(masses, default=0.0) * math.hypot(*scene.gravity)
-    return max([*(force * length for force in [*forces, weight]), *moments, *(q * length**2 for q in spread)])
+    return max(masses, default=0.0)
 
 
 def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beams:
