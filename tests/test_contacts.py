@@ -455,6 +455,10 @@ def test_directions_may_have_any_length(length):
         ({"type": "circle", "center": [0, -1], "radius": -0.1, "member": "m"}, "radius: found -0.1"),
         ({"type": "plane", "point": [0, 0], "normal": [0, 0], "member": "m"}, "normal: found"),
         ({"type": "wall", "point": [0, 0], "member": "m"}, "type: found 'wall', accepted"),
+        (
+            {"type": "circle", "center": [0, -1e12], "radius": 1e12, "member": "m"},
+            "radius: found 1e+12 m, accepted: up to",
+        ),
         ({**FLAT, "members": []}, "members: found no member, accepted: names of members, each once, or 'all'"),
         ({**FLAT, "members": ["m", "m"]}, "members: found a member twice"),
         ({**FLAT, "members": [5]}, "contacts.floor.members.0: found 5, accepted: a text"),

@@ -984,6 +984,12 @@ def _check_contacts(scene: Scene) -> None:
             continue
         if contact.node is not None:
             _check_carried(scene, name, contact.node)
+        if contact.radius is not None and contact.radius > FLATTEST * scene.size:
+            # Gaps are differences from the centre, which rounding would decide.
+            message = (
+                f"found {contact.radius:g} m, accepted: up to {FLATTEST:g} times the size of the scene; a plane is flat"
+            )
+            raise SceneError(message, ("contacts", name, "radius"))
         for member in members_of(contact, scene.members):
             if member in magnetised:
                 message = (
@@ -1009,6 +1015,10 @@ def _check_contacts(scene: Scene) -> None:
                 check_start(scene.obstacles[name], line.positions, line.tangents, scene.size, contact.member_radius)
             except SceneError as error:
                 raise SceneError(f"member {member!r} {error}", ("contacts", name)) from None
+
+
+FLATTEST = 1e9
+"""Radius of something round over the size, at which gaps are known to 1e-7 of the size."""
 
 
 def _check_carried(scene: Scene, name: str, node: str) -> None:

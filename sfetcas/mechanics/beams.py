@@ -71,9 +71,7 @@ ELEMENT_DATA = ("stiffness", "tangent", "compliance")
 
 
 def scales_of(scene: Scene) -> Scales:
-    """Units for a scene, from its longest member and its largest stiffness (else from springs, else from loads, else from
-    how fast it moves).
-    """
+    """Units for a scene, from its longest member and its largest stiffness (else springs, loads, or its speed)."""
     length = max(line.length for line in scene.center_lines.values())
     x = np.linspace(0.0, 1.0, 5)
     found = []
@@ -110,9 +108,7 @@ def load_size(scene: Scene, length: float) -> float:
 
 
 def moving_size(scene: Scene, length: float) -> float:
-    """Energy, N m, of what moves as fast at the begin as nothing else, or through a length, m, in the whole motion; zero
-    where nothing has a mass, and in statics.
-    """
+    """Energy, N m, at the largest speed at the begin, or at that of a length, m, in the whole motion; else zero."""
     if scene.analysis.type != "dynamic":
         return 0.0
     speeds = [math.hypot(*node.velocity) for node in scene.nodes.values() if node.velocity is not None]
