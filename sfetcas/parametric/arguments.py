@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -603,23 +602,20 @@ class Arguments:
         SceneError
             It has none to either side of the defaults.
         """
-        try:
-            return self._assembled_near(base, 1.0)
-        except SceneError as error:
-            # To one side a member may begin inside of the obstacle on which it lies.
-            with contextlib.suppress(SceneError):
-                return self._assembled_near(base, -1.0)
-            raise SceneError(f"{error} (asked for by the arguments)") from None
-
-    def _assembled_near(self, base: Model, side: float) -> Model:
-        """The model at values that are to a side of the defaults."""
         count, assembly = len(self._own), base.assembly
-        values = np.concatenate([self._generic(side), self.places])
-        numbers_there = values.tolist(), Active(values, self._symbols).tolist()
-        plain, symbolic = (self._followed(each[:count]) for each in numbers_there)
-        known = depending(with_numbers(self._scene, plain), symbolic) if count else self._scene
-        mesh = with_cuts(self._scene, base.mesh, symbolic, self._moved_ends(numbers_there[1][count:]))
-        return assemble(known, mesh, assembly=assembly, scales=base.scales)  # type: ignore[arg-type]
+        refused: SceneError | None = None
+        # To one side a member may begin inside of the obstacle on which it lies.
+        for side in (1.0, -1.0):
+            values = np.concatenate([self._generic(side), self.places])
+            numbers_there = values.tolist(), Active(values, self._symbols).tolist()
+            plain, symbolic = (self._followed(each[:count]) for each in numbers_there)
+            try:
+                known = depending(with_numbers(self._scene, plain), symbolic) if count else self._scene
+                mesh = with_cuts(self._scene, base.mesh, symbolic, self._moved_ends(numbers_there[1][count:]))
+                return assemble(known, mesh, assembly=assembly, scales=base.scales)  # type: ignore[arg-type]
+            except SceneError as error:
+                refused = refused or error
+        raise SceneError(f"{refused} (asked for by the arguments)") from None
 
     def _generic(self, side: float) -> Array:
         """Values near the defaults, to a side of these, where nothing vanishes by chance, within their ranges."""
