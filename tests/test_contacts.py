@@ -1092,3 +1092,22 @@ def test_a_bar_does_not_swing_through_a_circle_in_a_long_step():
     x, y = step.position("t")[:2]
     np.testing.assert_allclose([np.hypot(x, y), np.hypot(x - 1.2624, y + 0.5262)], [1.0, 0.5668], atol=1e-9)
     assert step.contacts["drum"]["at"] == 1.0
+
+
+@pytest.mark.parametrize("steps", [(1.0,), (0.1, 0.4, 1.0)])
+def test_a_tip_that_just_catches_a_peg_does_not_pass_through_it(steps):
+    """From one side of the peg to the other is less than a step of the way, and beyond it is an equilibrium, too."""
+    peg = np.array([0.9674, 0.5776])
+    table = {
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+        "members": {"bar": {"nodes": ["A", "B"], "type": "rigid"}},
+        "springs": {"k": {"type": "rotational", "node": "A", "stiffness": 0.7805}},
+        "loads": {"F": {"type": "force", "node": "B", "value": [-0.5407, 3.7111]}},
+        "contacts": {"peg": {"type": "circle", "center": peg.tolist(), "radius": 0.1405, "members": "all"}},
+        "analysis": {"steps": list(steps)},
+    }
+    last = solve(Scene.from_dict(table)).last
+    away = np.hypot(*peg)
+    # The angle at A of the triangle with sides of the bar, of the radius and to the peg.
+    below = np.arctan2(peg[1], peg[0]) - np.arccos((1.0 + away**2 - 0.1405**2) / (2.0 * away))
+    np.testing.assert_allclose(last.position("B")[:2], [np.cos(below), np.sin(below)], rtol=0, atol=1e-9)

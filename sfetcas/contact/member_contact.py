@@ -244,13 +244,16 @@ class MemberContact:
         """Whether members neither penetrate nor pass each other from one state to another."""
         self.edges.begin(before.fields)
         near = self._swung(before, after) < STRIDE and self.clear(after.fields)
-        return near and not (self.passed(before.fields, after.fields) or self._swept(before.fields, after.fields))
+        return near and not self.passed(before.fields, after.fields)
 
     def _swept(self, before: Fields, after: Fields) -> bool:
-        """Whether places of members that move straight from one state to another come inside of a round obstacle."""
+        """Whether places of members that move straight from one state to another come inside of a round obstacle that
+        these touch in neither.
+        """
+        touched = {point.pair for fields in (before, after) for point in fields.model.mesh.points}
         for pair in self.closest.pairs.values():
             stop = pair.stop
-            if stop is None or pair.edge or not pair.passable:
+            if stop is None or pair.edge or not pair.passable or pair.key in touched:
                 continue
             x = self.closest.samples(after.model.mesh, pair.members[0])
             places = (f.positions(pair.members[0], x) for f in (before, after))
@@ -783,11 +786,12 @@ class MemberContact:
     # -- steps ------------------------------------------------------------------------------------
 
     def passed(self, before: Fields, after: Fields) -> bool:
-        """Whether a member may have passed through another one between two states.
+        """Whether a member may have passed through another one, or an obstacle, between two states.
 
         What was nearest before, and is nearest after, must not have changed sides.
         """
-        return bool(self._crossings(before, after) or self._crossings(after, before))
+        crossed = self._crossings(before, after) or self._crossings(after, before)
+        return bool(crossed) or self._swept(before, after)
 
     def _crossings(self, before: Fields, after: Fields) -> list[Near]:
         """Where members are nearest in one state that are on other sides of each other in another one."""
@@ -919,7 +923,8 @@ class MemberContact:
         if self.penetration(there.fields, lined) > WITHIN * self.scene.size:
             return None
         far = self.turned(now.fields, there.fields) > self.stride or self._swung(now, there) > SWUNG
-        return None if far or self._crossings(there.fields, now.fields) else there
+        through = self._swept(now.fields, there.fields) or bool(self._crossings(there.fields, now.fields))
+        return None if far or through else there
 
     def _aside(self, before: Solved, after: Solved) -> bool:
         """Whether what begins to touch a round obstacle does so far round it from where it was: it may have gone deep
