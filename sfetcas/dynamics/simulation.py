@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import tolerances
 from ..contact.closest import Closest
-from ..contact.pairs import Near
+from ..contact.pairs import Near, PairKey
 from ..description.scene import Scene
 from ..description.sections import HEAVY
 from ..equilibria.meshing import WHERE, Meshing
@@ -77,6 +77,9 @@ SENSITIVE = (
     "runs of finer and finer steps do not come nearer to each other: so sensitive a motion cannot be told for so long"
 )
 """A note where the differences of runs support no error estimate."""
+
+COARSER = "what was reached is the motion on a coarser mesh"
+"""Of a failure on a finer mesh than one on which the motion went to its end."""
 
 RESCUES = 2
 """Number of finer meshes that are tried where the first run fails."""
@@ -385,7 +388,9 @@ class Simulation:
             if finer.interrupted or finer.failure is not None:
                 # The whole way, though not judged, says more than a part of it.
                 run.interrupted = finer.interrupted
-                run.failure = finer.failure
+                if finer.failure is not None:
+                    why = finer.failure
+                    run.failure = SolveError(why.status, f"{why.detail}; {COARSER}", why.last)
                 break
             before = apart
             apart, run = self._difference(run, finer), finer
@@ -408,7 +413,7 @@ class Simulation:
 
     def _ending_at(self, mesh: Mesh, run: MeshRun) -> Mesh:
         """The mesh with ends of elements where members are deepest in round obstacles."""
-        deepest = dict[Any, Near]()
+        deepest = dict[PairKey, Near]()
         for _, near in run.dips:
             stop = self._closest.pairs[near.pair].stop
             if stop is not None and stop.kind == "round" and near.gap < getattr(deepest.get(near.pair), "gap", 0.0):
