@@ -125,6 +125,9 @@ place slides some 5e-3.
 LESS, MORE = 0.3, 4.0
 """What drag is multiplied by after a step of a fall, and after one that was not found."""
 
+VAIN = 4
+"""Rounds one after the other in which it is not found what pushes along lines, after which none is near."""
+
 NUDGE = 0.02
 """Rotation, rad, by which an unstable state is moved along its unstable mode."""
 
@@ -182,6 +185,8 @@ class MemberContact:
     edges : Edges
     patient : bool
         Whether a step is rather given up than that ends of lines are sought anew.
+    vain : int
+        Rounds, the last ones, in which it was not found what pushes along lines.
     across : callable or None
         Model -> its curve and a direction on it: where it is given the factor of the loads is an unknown, from that of
         the near state on, and the equilibrium one across the direction, see :meth:`.Curve.corrected`.
@@ -201,7 +206,7 @@ class MemberContact:
         self.redundant: bool | None = None
         self._loose: frozenset[str] | None = None
         self.lines = Lines(scene, self.closest, fixed)
-        self.falls, self.patient = 0, False
+        self.falls, self.patient, self.vain = 0, False, 0
         self.edges = Edges(scene, self.closest, self.tolerance)
         self.across: Callable[[Prepared], tuple[Curve, Tangent]] | None = None
 
@@ -332,6 +337,7 @@ class MemberContact:
             # Another number seldom helps here, but where lines end.
             if self.lines.keys and (ends or not count):
                 pressing = self._pressing(mesh, numbered, source, way, since, drag)
+                self.vain = self.vain + 1 if pressing is None else 0
             if pressing is not None or not (ends and self.lines.keys):
                 pushing, near = pressing or (numbered, source)
                 set_up = self.gripping.set_up(near.fields, mesh, pushing)
@@ -610,9 +616,10 @@ class MemberContact:
         careful, alone, short = False, set[object](), set[PairKey]()
         flat: Points = ()
         most: Points = ()
+        self.vain = 0
         for _ in range(ROUNDS // 3 if ends else ROUNDS):
             found = self.solved(mesh, points, source, way, since if drag else None, drag, ends)
-            if found is None and ends:
+            if (found is None and ends) or self.vain == VAIN:
                 return None
             if found is None:
                 if solved and several:
