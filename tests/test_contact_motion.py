@@ -559,9 +559,9 @@ def test_in_steps_that_are_given_flexible_members_do_not_sink_into_obstacles():
         "nodes": {"A": {"position": [0, 0.1]}, "B": {"position": [0.8, 0.7]}},
         "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
         "contacts": {"f": {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}},
-        "analysis": {"type": "dynamic", "end": 0.3, "accuracy": 1e-2, "integrator": "stepping", "step": 1e-2},
+        "analysis": {"type": "dynamic", "end": 0.3, "output": 0.02, "accuracy": 1e-2},
     }
-    table["analysis"]["output"] = 0.02
+    table["analysis"] |= {"integrator": "stepping", "step": 1e-2}
     scene = Scene.from_dict(table)
     motion = solve(scene)
     assert deepest(motion) < 1e-2 * scene.size

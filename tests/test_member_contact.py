@@ -352,7 +352,7 @@ def test_straight_ropes_whose_ends_come_nearer_lie_across_each_other():
 def test_members_at_random_that_were_refused(kind, seed, forces):
     step = solve(Scene.from_dict(member_scene(kind, seed))).last
     assert wrong_contacts(step) == []
-    assert step.certificate.stable is not False
+    assert step.certificate.stable in (True, "neutral")
     assert sum(np.linalg.norm(force) > 0.0 for force in np.reshape(step.contacts["c"]["force"], (-1, 3))) >= forces
 
 

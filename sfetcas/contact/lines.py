@@ -229,7 +229,7 @@ class Lines:
         own = [p for p in points if p.pair == key]
         pressed = {found[1] for found in (self.element_of(mesh, p) for p in own) if found}
         for x in self._known_ends(mesh, own, key):
-            e = int(np.clip(np.searchsorted(cuts, x) - 1, 0, len(cuts) - 2))
+            e = mesh.element_at(key[1][0], x)
             margin = AT_END * float(cuts[e + 1] - cuts[e])
             if cuts[e] + margin < x < cuts[e + 1] - margin:
                 taken.add(e)

@@ -967,8 +967,7 @@ class MemberContact:
             between = [self.closest.pairs[key] for key in sorted(self.lines.keys) if len(key[1]) == 2]
             for near in self.closest.found(found.fields, 0.0, between):
                 if near.gap < -BETWEEN * near.distance and near.members[0] not in self.fixed:
-                    cuts = model.mesh.cuts[near.members[0]]
-                    marks[near.members[0]][np.clip(np.searchsorted(cuts, near.at[0]) - 1, 0, len(cuts) - 2)] = True
+                    marks[near.members[0]][model.mesh.element_at(near.members[0], near.at[0])] = True
             if not any(marked.any() for marked in marks.values()):
                 return found
             mesh = replace(model.mesh.refined(marks, found.fields.kinks), points=())

@@ -367,7 +367,7 @@ def integrate(
     breaks : (n,), rising times at which loads or motions have kinks, then the end; all times are dimensionless
     step : fixed length; the steps between two breaks are equal and no longer
     tolerance : instead of ``step``: permitted error of a step, over the unit of length
-    first : length of the first step that is tried
+    first : length of the first step that is tried; after an event none that is longer is
     beyond : time after the last break up to which loads and motions are smooth
     events : what ends steps where something happens, after which the integration begins anew, or is over
 

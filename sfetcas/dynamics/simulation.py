@@ -78,7 +78,7 @@ SENSITIVE = (
 )
 """A note where the differences of runs support no error estimate."""
 
-COARSER = "what was reached is the motion on a coarser mesh"
+ON_COARSER = "what was reached is the motion on a coarser mesh"
 """Of a failure on a finer mesh than one on which the motion went to its end."""
 
 RESCUES = 2
@@ -372,8 +372,11 @@ class Simulation:
             # In steps that are given runs on finer meshes need not agree, but members must not dip into obstacles.
             if not run.dips or run.interrupted or run.failure is not None:
                 break
-            mesh = self._without_dips(mesh, run)
-            run = self.run(mesh, 0)
+            halved = self._without_dips(mesh, run)
+            if halved.same(mesh):
+                # Rigid members are not halved.
+                break
+            mesh, run = halved, self.run(halved, 0)
         for rounds in range(1, 1 + ROUNDS if analysis.step is None else 1):
             failed = run.failure is not None
             bent = run.failure is not None and run.failure.status in LIMITS
@@ -390,7 +393,7 @@ class Simulation:
                 run.interrupted = finer.interrupted
                 if finer.failure is not None:
                     why = finer.failure
-                    run.failure = SolveError(why.status, f"{why.detail}; {COARSER}", why.last)
+                    run.failure = SolveError(why.status, f"{why.detail}; {ON_COARSER}", why.last)
                 break
             before = apart
             apart, run = self._difference(run, finer), finer
@@ -407,8 +410,7 @@ class Simulation:
         """A mesh whose elements are halved where members dip into obstacles, and end at round ones where they do."""
         marks = {name: np.zeros(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
         for _, near in run.dips:
-            cuts = mesh.cuts[near.members[0]]
-            marks[near.members[0]][np.clip(np.searchsorted(cuts, near.at[0]) - 1, 0, len(cuts) - 2)] = True
+            marks[near.members[0]][mesh.element_at(near.members[0], near.at[0])] = True
         return self._ending_at(mesh.refined(marks), run)
 
     def _ending_at(self, mesh: Mesh, run: MeshRun) -> Mesh:

@@ -534,13 +534,12 @@ class Fields:
 
     def _pushes(self, member: str) -> list[tuple[int, float, Array]]:
         """What pushes a member: its element, counted from 0, fraction of the length, and force (3,), dimensionless."""
-        cuts, found = self.model.mesh.cuts[member], list[tuple[int, float, Array]]()
+        found = list[tuple[int, float, Array]]()
         for at, force in self._pushed.get(member, ()):
             if force is None:
                 continue
             # At an end of elements it is that before it, as the terms of rings have it.
-            element = int(np.clip(np.searchsorted(cuts, at, side="left") - 1, 0, len(cuts) - 2))
-            found.append((element, at, force / self.model.scales.force))
+            found.append((self.model.mesh.element_at(member, at), at, force / self.model.scales.force))
         return found
 
     def _strung(self, member: str, x: Array, rotation: Array, moment: Array) -> tuple[Array, Array]:

@@ -400,6 +400,11 @@ class Mesh:
         """Index in ``cuts`` of the end of elements that is nearest to a fraction of a member's length."""
         return int(np.argmin(np.abs(self.cuts[member] - place)))
 
+    def element_at(self, member: str, place: float) -> int:
+        """The element, counted from 0, in which a fraction of a member's length is; of two that meet, the first."""
+        cuts = self.cuts[member]
+        return int(np.clip(np.searchsorted(cuts, place) - 1, 0, len(cuts) - 2))
+
 
 def breaks_of(scene: Scene, member: str) -> Array:
     """Fractions (n,) of a member's length at which its solution has a kink, so that an element has to end there."""

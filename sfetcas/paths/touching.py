@@ -499,7 +499,7 @@ class Touching(Conditions[_At]):
             if len(point.members) > 1 or point.edge or not (point.slides[0] and self.run.lines.bends(point.members[0])):
                 continue
             (member,), at, cuts = point.members, point.at[0], model.mesh.cuts[point.members[0]]
-            element = int(np.clip(np.searchsorted(cuts, at) - 1, 0, len(cuts) - 2))
+            element = model.mesh.element_at(member, at)
             length = (cuts[element + 1] - cuts[element]) * self.closest.lengths[member] / model.scales.length
             bends = fields.contact_point(begun)["push"] / model.scales.force * length / fields.stiffness(member, at)
             found |= bool(self._bend(fields, point) <= bends + STRAIGHT)
