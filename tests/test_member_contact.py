@@ -347,6 +347,8 @@ def test_straight_ropes_whose_ends_come_nearer_lie_across_each_other():
         ("ropes", 24, 3),
         # A line within which rods bend away from each other: they touch at its ends, and these slide.
         ("twisted", 20, 1),
+        # A line beside which the members touch once more: of all places on it each slid past the others.
+        ("arcs", 116, 3),
     ],
 )
 def test_members_at_random_that_were_refused(kind, seed, forces):

@@ -285,7 +285,8 @@ class Lines:
             if key in self.keys:
                 stays = self.chosen(key) or not any(map(slides, own))
             elif pair.stop is None:
-                stays = least == LINE or count < LINE or not self._flat(found, pair, places)
+                flat = [] if least == LINE or count < LINE else self._flat(found, pair, places)
+                stays, places = not flat, flat or places
             else:
                 stays = count < least or (least == LINE and not self._level(found, pair, places))
             if stays:
@@ -300,8 +301,12 @@ class Lines:
         low, high = min(places) - longest, max(places) + longest
         mesh = self.divided(replace(mesh, points=()), pair, places)
         near = self.closest.along(found.fields, pair, mesh, 0.1 * pair.width)
-        others = tuple(point for point in points_of(found) if point.pair != pair.key or not beside_ends(point))
-        return mesh, (*others, *self.laid(one for one in near if low <= one.at[0] <= high))
+        own = [point for point in points_of(found) if point.pair == pair.key and beside_ends(point)]
+        # What touches elsewhere does so at the nearest ends of elements.
+        cuts = mesh.cuts[pair.members[0]]
+        elsewhere = {float(cuts[mesh.cut_at(pair.members[0], p.at[0])]) for p in own if not low <= p.at[0] <= high}
+        others = tuple(point for point in points_of(found) if point not in own)
+        return mesh, (*others, *self.laid(one for one in near if low <= one.at[0] <= high or one.at[0] in elsewhere))
 
     def parallel(self, found: Solved, mesh: Mesh) -> tuple[Mesh, Points] | None:
         """The mesh and points where members that touch each other, and are as near between the places, are a line from
@@ -311,16 +316,21 @@ class Lines:
             own = [p for p in points_of(found) if p.pair == key and beside_ends(p)]
             if pair.stop is not None or key in self.keys or len(own) < LINE or not self.bends(pair.members[0]):
                 continue
-            places = [point.at[0] for point in own]
-            if self._flat(found, pair, places):
+            places = self._flat(found, pair, [point.at[0] for point in own])
+            if places:
                 return self._as_line(found, mesh, pair, places)
         return None
 
-    def _flat(self, found: Solved, pair: Pair, places: Sequence[float]) -> bool:
-        """Whether two members are as near between places at which they touch each other, three or more, as there."""
-        middles = 0.5 * (np.sort(places)[1:] + np.sort(places)[:-1])
+    def _flat(self, found: Solved, pair: Pair, places: Sequence[float]) -> list[float]:
+        """Of places at which two members touch each other the most in succession, three or more, between which they
+        are as near as there; none where there are none.
+        """
+        ordered = np.sort(places)
+        middles = 0.5 * (ordered[1:] + ordered[:-1])
         near = {one.at[0] for one in self.closest.beside(found.fields, pair, middles, FLAT * pair.distance)}
-        return len(places) >= LINE and near == set(middles.tolist())
+        apart = [i + 1 for i, x in enumerate(middles.tolist()) if x not in near]
+        longest = max(np.split(ordered, apart), key=len)
+        return longest.tolist() if len(longest) >= LINE else []
 
     def _level(self, found: Solved, pair: Pair, places: Sequence[float]) -> bool:
         """Whether a member is near to an obstacle somewhere between two places at which it touches that."""
