@@ -174,6 +174,7 @@ ORDER = [
     "contact.gripping",
     "contact.lines",
     "contact.edges",
+    "contact.passing",
     "contact.member_contact",
     "contact.stopped_ends",
     "contact.kept",

@@ -20,7 +20,7 @@ import numpy as np
 from .. import tolerances
 from ..description.scene import Scene
 from ..errors import SceneError
-from ..mathematics.arrays import TINY, Array, Index, numbers, unit
+from ..mathematics.arrays import Array, Index, numbers, unit
 from ..mechanics.accuracy import roughness
 from ..mechanics.contact_points import undeformed_vectors
 from ..mechanics.equations import Point, State
@@ -41,6 +41,7 @@ from .edges import Edges
 from .gripping import CENTRED, FIRM, Gripping, Placed
 from .lines import LINE, SHORT_LINE, Lines, Points, begun, ends_of, points_of
 from .pairs import ONE, Near, Pair, PairKey
+from .passing import Passing, tangents_turned
 
 __all__ = ["FITS", "LESS", "MORE", "MemberContact", "Way"]
 
@@ -183,6 +184,7 @@ class MemberContact:
     lines : Lines
         The lines along which members touch.
     edges : Edges
+    passing : Passing
     patient : bool
         Whether a step is rather given up than that ends of lines are sought anew.
     vain : int
@@ -208,6 +210,7 @@ class MemberContact:
         self.lines = Lines(scene, self.closest, fixed)
         self.falls, self.patient, self.vain = 0, False, 0
         self.edges = Edges(scene, self.closest, self.tolerance)
+        self.passing = Passing(scene, self.closest, self.edges, self.tolerance)
         self.across: Callable[[Prepared], tuple[Curve, Tangent]] | None = None
 
     def hold(self, fixed: Collection[str]) -> None:
@@ -249,26 +252,7 @@ class MemberContact:
         """Whether members neither penetrate nor pass each other from one state to another."""
         self.edges.begin(before.fields)
         near = self._swung(before, after) < STRIDE and self.clear(after.fields)
-        return near and not self.passed(before.fields, after.fields)
-
-    def _swept(self, before: Fields, after: Fields) -> bool:
-        """Whether places of members that move straight from one state to another come inside of a round obstacle that
-        these touch in neither.
-        """
-        touched = {point.pair for fields in (before, after) for point in fields.model.mesh.points}
-        for pair in self.closest.pairs.values():
-            stop = pair.stop
-            if stop is None or pair.edge or not pair.passable or pair.key in touched:
-                continue
-            x = self.closest.samples(after.model.mesh, pair.members[0])
-            places = (f.positions(pair.members[0], x) for f in (before, after))
-            a, b = (f.seen(pair.contact, p, p)[0] for f, p in zip((before, after), places, strict=True))
-            first, way = (a - stop.place) @ stop.across, (b - a) @ stop.across
-            size = np.maximum(np.einsum("ni,ni->n", way, way), TINY)
-            share = np.clip(-np.einsum("ni,ni->n", first, way) / size, 0.0, 1.0)
-            if (np.linalg.norm(first + share[:, None] * way, axis=1) < pair.distance - self.tolerance).any():
-                return True
-        return False
+        return near and not self.passing.passed(before.fields, after.fields)
 
     @staticmethod
     def _swung(before: Solved, after: Solved) -> float:
@@ -592,7 +576,7 @@ class MemberContact:
             if found is not None and not drag and any(map(self.lines.chosen, self.lines.keys)):
                 lines = self.lines.keys
                 ended = self._resolved(replace(found.model.mesh, points=()), points_of(found), found, way, drag, True)
-                if ended is None or self.turned(found.fields, ended.fields) > STRIDE:
+                if ended is None or tangents_turned(found.fields, ended.fields) > STRIDE:
                     self.lines.keys = lines
                 else:
                     found = ended
@@ -792,39 +776,6 @@ class MemberContact:
 
     # -- steps ------------------------------------------------------------------------------------
 
-    def passed(self, before: Fields, after: Fields) -> bool:
-        """Whether a member may have passed through another one, or an obstacle, between two states.
-
-        What was nearest before, and is nearest after, must not have changed sides.
-        """
-        crossed = self._crossings(before, after) or self._crossings(after, before)
-        return bool(crossed) or self._swept(before, after)
-
-    def _crossings(self, before: Fields, after: Fields) -> list[Near]:
-        """Where members are nearest in one state that are on other sides of each other in another one."""
-        pairs = [pair for pair in self.closest.pairs.values() if pair.passable]
-        moved = 0.0
-        for member in {member for pair in pairs for member in pair.members}:
-            x = self.closest.samples(after.model.mesh, member)
-            places = after.positions(member, x), before.positions(member, x)
-            seen = {pair.contact for pair in pairs if member in pair.members}
-            for contact in seen:
-                one, other = (f.seen(contact, p, p)[0] for f, p in zip((after, before), places, strict=True))
-                moved = max(moved, float(np.linalg.norm(one - other, axis=1).max()))
-        found = self.closest.found(before, 2.0 * moved, pairs)
-        vectors = Placed(self.scene, after, found).vectors
-        crossed = [near for near, vector in zip(found, vectors, strict=True) if near.normal @ vector <= 0.0]
-        turned = self.turned(before, after) if self.edges.pairs else 0.0
-        return crossed + self.edges.crossed(before, after, turned)
-
-    def turned(self, before: Fields, after: Fields) -> float:
-        """Largest angle between tangents of the same place in two states, rad."""
-        most = 1.0
-        for member in after.model.members:
-            x = np.linspace(0.0, 1.0, 33)
-            most = min(most, float(np.einsum("ni,ni->n", before.tangents(member, x), after.tangents(member, x)).min()))
-        return float(np.arccos(np.clip(most, -1.0, 1.0)))
-
     def unstable(self, found: Solved, way: Way) -> bool:
         """Whether a state is unstable, and the scene asks to leave such states."""
         return self.leaves and found.model.minimisable and found.negative > 0 and self.rolling(found, way).negative > 0
@@ -883,11 +834,11 @@ class MemberContact:
             # In the shortest steps what no finer mesh has goes on as it is: the answer is refined all the same.
             there = there if finer is None and step <= NARROW else finer
             mesh = mesh if there is None else replace(there.model.mesh, points=())
-            turned = 0.0 if there is None else self.turned(now.solved.fields, there.fields)
+            turned = 0.0 if there is None else tangents_turned(now.solved.fields, there.fields)
             falling = there is not None and self.unstable(there, way(part))
             # What turns so much faster than before may have gone over to another branch.
             sudden = turned > max(TOLD, SUDDEN * pace * (part - now.part)) and pace > 0.0
-            aside = there is not None and self._aside(now.solved, there)
+            aside = there is not None and self.passing.aside(now.solved.fields, there.fields)
             if there is None or ((falling or sudden or aside) and step > NARROW):
                 # What was taken for a line on the way to a state that is not taken is none.
                 step, self.lines.keys = 0.5 * (part - now.part), lines
@@ -919,30 +870,19 @@ class MemberContact:
         self.gripping.since = now.fields
         points = tuple(map(self.gripping.begun, points_of(now)))
         there = self.resolved(mesh, points, now, way)
-        crossings = [] if there is None else self._crossings(now.fields, there.fields)
+        crossings = [] if there is None else self.passing.crossed(now.fields, there.fields)
         if crossings:
             # Members thinner than the step is long touch where they were nearest before.
             there = self.resolved(mesh, (*points, *map(begun, crossings)), now, way)
-            crossings = [] if there is None else self._crossings(now.fields, there.fields)
+            crossings = [] if there is None else self.passing.crossed(now.fields, there.fields)
         if there is None or crossings:
             return None
         lined = [self.closest.pairs[key] for key in sorted(self.lines.keys) if self.lines.chosen(key)]
         if self.penetration(there.fields, lined) > WITHIN * self.scene.size:
             return None
-        far = self.turned(now.fields, there.fields) > self.stride or self._swung(now, there) > SWUNG
-        through = self._swept(now.fields, there.fields) or bool(self._crossings(there.fields, now.fields))
+        far = tangents_turned(now.fields, there.fields) > self.stride or self._swung(now, there) > SWUNG
+        through = self.passing.swept(now.fields, there.fields) or bool(self.passing.crossed(there.fields, now.fields))
         return None if far or through else there
-
-    def _aside(self, before: Solved, after: Solved) -> bool:
-        """Whether what begins to touch a round obstacle does so far round it from where it was: it may have gone deep
-        into it on the way, where that pushes it to another side.
-        """
-        had = {point.pair for point in before.model.mesh.points}
-        begun = [p for p in points_of(after) if len(p.members) == 1 and not p.edge and p.pair not in had]
-        earlier, now = (Placed(self.scene, state.fields, begun) for state in (before, after))
-        stops = (self.closest.pairs[point.pair].stop for point in begun)
-        cosines = [earlier.normal(i, stop) @ now.normal(i, stop) for i, stop in enumerate(stops)]
-        return min(cosines, default=1.0) < np.cos(STRIDE)
 
     def _fallen_from(self, mesh: Mesh, now: _Step, part: float, way: Way) -> Solved | None:
         """Where a state comes to rest a little further on its way, where none is near to it; None where it does not."""
@@ -952,8 +892,8 @@ class MemberContact:
         rest = None if rest is None else self._refined(rest, way)
         if rest is None or rest.negative > 0:
             return None
-        turned = self.turned(now.solved.fields, rest.fields)
-        far = turned > self.stride or self.passed(now.solved.fields, rest.fields)
+        turned = tangents_turned(now.solved.fields, rest.fields)
+        far = turned > self.stride or self.passing.passed(now.solved.fields, rest.fields)
         self.falls += far
         if far or turned > TOLD:
             self.jumps.append((part, ENDED))
@@ -972,7 +912,7 @@ class MemberContact:
                 return found
             mesh = replace(model.mesh.refined(marks, found.fields.kinks), points=())
             finer = self.resolved(mesh, self.lines.points_on(mesh, found), found, way)
-            if finer is None or self.turned(found.fields, finer.fields) > STRIDE:
+            if finer is None or tangents_turned(found.fields, finer.fields) > STRIDE:
                 return None
             found = finer
         return found
@@ -988,7 +928,7 @@ class MemberContact:
             if self.lines.moved(before, mesh) < self.accuracy:
                 break
             there = self.resolved(mesh, points, found, way)
-            if there is None or self.turned(found.fields, there.fields) > STRIDE:
+            if there is None or tangents_turned(found.fields, there.fields) > STRIDE:
                 break
             found = there
         return found
@@ -1000,7 +940,7 @@ class MemberContact:
             return found
         points = self.lines.by_element(points_of(found))
         there = self.resolved(replace(found.model.mesh, points=()), points, found, way)
-        near = there is not None and self.turned(found.fields, there.fields) < STRIDE
+        near = there is not None and tangents_turned(found.fields, there.fields) < STRIDE
         there = self.fitted(there, way) if there is not None and near else found
         self.lines.keys, self.lines.ending = keys, frozenset()
         return there
@@ -1012,7 +952,7 @@ class MemberContact:
         """
         parted = self.lines.parted(found, self.tolerance, turned)
         there = None if parted is None else self.resolved(*parted[:2], found, way)
-        return None if there is None or self.turned(found.fields, there.fields) > STRIDE else there
+        return None if there is None or tangents_turned(found.fields, there.fields) > STRIDE else there
 
     def fallen(self, mesh: Mesh, found: Solved, way: Way, side: int = 0) -> Solved | None:
         """Where an unstable state falls to through something viscous; None where it does not come to rest.
@@ -1030,8 +970,8 @@ class MemberContact:
         drag, little = max(first, BEYOND * deep), 0.0
         for _ in range(FALLS):
             there = self.resolved(mesh, points_of(now), now, way, drag)
-            turned = np.inf if there is None else self.turned(now.fields, there.fields)
-            if there is None or turned > STRIDE or self.passed(now.fields, there.fields):
+            turned = np.inf if there is None else tangents_turned(now.fields, there.fields)
+            if there is None or turned > STRIDE or self.passing.passed(now.fields, there.fields):
                 little, drag = drag, drag * min(MORE, max(1.5, turned / (AIM * STRIDE)))
                 if drag > largest * max(deep, 1.0):
                     return None
@@ -1040,7 +980,7 @@ class MemberContact:
             # What is unstable is near to an equilibrium where it hardly moves.
             if turned < SLOW and drag <= first and (turned < STILL or not now.negative):
                 rest = self.resolved(mesh, points_of(now), now, way)
-                if rest is not None and self._near(now, rest):
+                if rest is not None and self.near(now, rest):
                     if rest.negative == 0:
                         return rest
                     if turned < STILL:
@@ -1053,8 +993,10 @@ class MemberContact:
             drag, little = max(LESS * drag, np.sqrt(drag * little), floor), LESS * little
         return None
 
-    def _near(self, now: Solved, rest: Solved) -> bool:
-        return self.turned(now.fields, rest.fields) < STRIDE and not self.passed(now.fields, rest.fields)
+    def near(self, now: Solved, there: Solved, most: float = STRIDE) -> bool:
+        """Whether members can have moved from one state to another in a step in which they turn by so much, rad."""
+        small = tangents_turned(now.fields, there.fields) <= most
+        return small and not self.passing.passed(now.fields, there.fields)
 
     def _fallen_on(self, mesh: Mesh, found: Solved, way: Way) -> Solved | None:
         """Where what has come to rest at an unstable state falls to from there."""

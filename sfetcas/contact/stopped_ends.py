@@ -28,6 +28,7 @@ from ..solvers.pseudo_transient import Drag
 from .lines import Points, begun, points_of
 from .member_contact import LESS, MORE, MemberContact, Way
 from .pairs import Pair
+from .passing import tangents_turned
 
 __all__ = ["StoppedEnds", "brought_in", "stops_ends"]
 
@@ -207,7 +208,7 @@ def brought_in(run: MemberContact, source: Solved, way: Way) -> Solved | None:
             there = run.resolved(mesh, points, now, way)
             if there is None and points and now is source:
                 there = _held_back(run, mesh, points, now, way)
-            if there is None or run.turned(now.fields, there.fields) > run.stride:
+            if there is None or tangents_turned(now.fields, there.fields) > run.stride:
                 step, run.lines.keys = 0.5 * step, lines
                 if step < SHORTEST or not deep:
                     return None

@@ -14,6 +14,7 @@ from .. import tolerances
 from ..contact.held_inside import refuse_held_inside
 from ..contact.lines import points_of
 from ..contact.member_contact import FITS, MemberContact
+from ..contact.passing import tangents_turned
 from ..description.inserting import stops_between
 from ..description.scene import Scene
 from ..description.supports import along
@@ -104,7 +105,7 @@ class MemberContactSteps:
             bent = self.ways.bent(pilot, share * factor)
             if bent is None:
                 return None
-            if self.run.turned(zero.fields, bent.fields) < NEAR and self.run.unstopped(zero, bent):
+            if tangents_turned(zero.fields, bent.fields) < NEAR and self.run.unstopped(zero, bent):
                 return bent
         return None
 
@@ -236,9 +237,9 @@ class MemberContactSteps:
         """
         mesh, run = replace(mesh, points=()), self.run
         there = run.resolved(mesh, run.lines.points_on(mesh, found), found, lambda model: model.loading(factor))
-        if there is None or run.turned(found.fields, there.fields) > NEAR:
+        if there is None or tangents_turned(found.fields, there.fields) > NEAR:
             there = None if self.kept else run.relaxed(mesh, found, lambda model: model.loading(factor))
-            if there is not None and run.turned(found.fields, there.fields) > NEAR:
+            if there is not None and tangents_turned(found.fields, there.fields) > NEAR:
                 self.moved.add(factor)
         if there is None:
             detail = "what touches on a coarse mesh was not found on a finer one"

@@ -147,9 +147,7 @@ class Lying:
         run.edges.begin(now.fields)
         found = run.resolved(*self._laid(source, begins), source, way)
         found = None if found is None else run.fitted(found, way, fits)
-        if found is None or run.turned(now.fields, found.fields) > STRIDE or run.passed(now.fields, found.fields):
-            return None
-        return found
+        return found if found is not None and run.near(now, found, STRIDE) else None
 
     def _laid(self, source: Solved, begins: Sequence[ContactPoint]) -> tuple[Mesh, Points]:
         """The elements, with those that lines need, and the places along these and elsewhere, of an expected state.

@@ -598,7 +598,7 @@ class Touching(Conditions[_At]):
     def passed(self, before: Standing, after: Standing) -> bool:
         """As of :class:`.Conditions`."""
         self.run.edges.begin(before.fields)
-        return self.run.passed(before.fields, after.fields)
+        return self.run.passing.passed(before.fields, after.fields)
 
 
 SAME_END = 1e-9
