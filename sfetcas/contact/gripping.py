@@ -6,7 +6,7 @@ when they began to touch: between the two states that is in the ratio of the gap
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from ..mechanics.fields import Fields
 from ..mechanics.mesh import YIELDING, ContactPoint, Grip, Mesh, Vector
 from ..mechanics.segments import stations_of_line
 from .closest import Closest
-from .pairs import Near
+from .pairs import Near, PairKey
 
 __all__ = ["CENTRED", "FIRM", "Gripping", "Placed"]
 
@@ -118,7 +118,11 @@ class Gripping:
         now = Placed(self.scene, fields, points)
         before = now if self.since is None else Placed(self.scene, self.since, points)
         set_up = [self._set_up(fields, point, i, now, before) for i, point in enumerate(points)]
-        return tuple(self._on_line(fields, mesh, point) if point.line else point for point in set_up)
+        for key, numbers in _on_lines(set_up).items():
+            own = [set_up[i] for i in numbers]
+            for i, point in zip(numbers, self._along_line(fields, mesh, key, own), strict=True):
+                set_up[i] = point
+        return tuple(set_up)
 
     def _set_up(self, fields: Fields, point: ContactPoint, i: int, now: Placed, before: Placed) -> ContactPoint:
         coefficient = self.scene.contacts[point.contact].friction
@@ -151,32 +155,36 @@ class Gripping:
             ),
         )
 
-    def _on_line(self, fields: Fields, mesh: Mesh, point: ContactPoint) -> ContactPoint:
-        """A point on a line with directions at each of its places."""
-        if point.grip is None:
-            return point
-        (member,), (x, share) = point.members, stations_of_line(mesh, point)
-        normals, tangents = self._along(fields, point, x)
+    def _along_line(
+        self, fields: Fields, mesh: Mesh, pair: PairKey, points: Sequence[ContactPoint]
+    ) -> Iterator[ContactPoint]:
+        """Points on a line with directions at each of their places."""
+        (contact, (member,)), since = pair, fields if self.since is None else self.since
+        stations, shares = zip(*(stations_of_line(mesh, point) for point in points), strict=True)
+        x, ends = np.concatenate(stations), np.cumsum([len(at) for at in stations])[:-1]
+        normals, tangents = self._surface(fields, pair, x)
         ways = [unit(tangents - np.einsum("ni,ni->n", tangents, normals)[:, None] * normals)]
         if fields.model.space:
             ways.append(np.cross(normals, ways[0]))
-        since = fields if self.since is None else self.since
-        places, _ = since.seen(point.contact, since.positions(member, x), tangents)
-        moved = places - self.scene.center_lines[member].positions(x) + point.grip.touched
-        means = [float(share @ np.einsum("ni,ni->n", way, moved)) for way in ways]
-        origin = three(np.array([0.0, *means]))
+        directions = np.stack(ways, axis=1)
+        places, _ = since.seen(contact, since.positions(member, x), tangents)
+        moved = np.einsum("nki,ni->nk", directions, places - self.scene.center_lines[member].positions(x))
         frame = tuple(_told(np.eye(3)[i + 1]) for i in range(len(ways)))
-        along = tuple(_told(way) for way in np.stack(ways, axis=1).reshape(-1, 3))
-        grip = replace(point.grip, frame=frame, origin=_told(origin), before=(), now=(), along=along)
-        return replace(point, grip=grip)
+        parts = zip(points, shares, np.split(directions, ends), np.split(moved, ends), strict=True)
+        for point, share, along, way in parts:
+            assert point.grip is not None
+            origin = three(np.array([0.0, *(share @ (way + along @ np.array(point.grip.touched)))]))
+            told = tuple(map(tuple, along.reshape(-1, 3).tolist()))
+            grip = replace(point.grip, frame=frame, origin=_told(origin), before=(), now=(), along=told)
+            yield replace(point, grip=grip)
 
-    def _along(self, fields: Fields, point: ContactPoint, x: Array) -> tuple[Array, Array]:
+    def _surface(self, fields: Fields, pair: PairKey, x: Array) -> tuple[Array, Array]:
         """Unit normals (n, 3) of an obstacle at fractions x (n,) of the length of a member on it, and unit tangents
         (n, 3), as the obstacle sees them.
         """
-        stop, (member,) = self.closest.pairs[point.pair].stop, point.members
+        (contact, (member,)), stop = pair, self.closest.pairs[pair].stop
         assert stop is not None
-        places, tangents = fields.seen(point.contact, fields.positions(member, x), fields.tangents(member, x))
+        places, tangents = fields.seen(contact, fields.positions(member, x), fields.tangents(member, x))
         return stop.normals(places, tangents), tangents
 
     def begins(self, points: Iterable[ContactPoint], limit: float) -> float | None:
@@ -198,18 +206,15 @@ class Gripping:
         """Whether a point has moved so far that friction has to be set up again where it is."""
         if not any(point.grip for point in points):
             return False
-        placed = Placed(self.scene, fields, now)
-        for i, point in enumerate(points):
-            if point.grip is not None and (
-                self._off_line(fields, point, point.grip) if point.line else self._off(i, point, now[i], placed)
-            ):
+        for key, numbers in _on_lines(points).items():
+            grips = [(points[i], grip) for i in numbers if (grip := points[i].grip) is not None]
+            x = np.concatenate([stations_of_line(fields.model.mesh, point)[0] for point, _ in grips])
+            ways = np.concatenate([grip.along for _, grip in grips]).reshape(len(x), -1, 3)
+            if np.abs(np.einsum("nki,ni->nk", ways, self._surface(fields, key, x)[0])).max() > CENTRED:
                 return True
-        return False
-
-    def _off_line(self, fields: Fields, point: ContactPoint, grip: Grip) -> bool:
-        normals, _ = self._along(fields, point, stations_of_line(fields.model.mesh, point)[0])
-        ways = np.reshape(grip.along, (len(normals), -1, 3))
-        return bool(np.abs(np.einsum("nki,ni->nk", ways, normals)).max() > CENTRED)
+        placed = Placed(self.scene, fields, now)
+        single = (i for i, point in enumerate(points) if point.grip is not None and not point.line)
+        return any(self._off(i, points[i], now[i], placed) for i in single)
 
     def _off(self, i: int, point: ContactPoint, now: ContactPoint, placed: Placed) -> bool:
         assert point.grip is not None
@@ -218,6 +223,15 @@ class Gripping:
         turned = np.abs(np.array(point.grip.frame) @ placed.normal(i, self.closest.pairs[now.pair].stop)).max()
         tangents = np.abs(np.array(placed.tangents[i]) - np.array(point.grip.now)).max()
         return bool(along > CENTRED * self.scene.size or turned > CENTRED or tangents > CENTRED)
+
+
+def _on_lines(points: Sequence[ContactPoint]) -> dict[PairKey, list[int]]:
+    """Numbers of the rough points on each line."""
+    found: dict[PairKey, list[int]] = {}
+    for i, point in enumerate(points):
+        if point.line and point.grip is not None:
+            found.setdefault(point.pair, []).append(i)
+    return found
 
 
 def _told(vector: Array) -> Vector:

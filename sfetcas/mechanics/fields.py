@@ -147,12 +147,20 @@ class Fields:
         """How an obstacle has moved since the undeformed scene: the matrix (3, 3) of its rotation, and the place (3,) m
         to which that would turn the origin; None where it stays.
         """
-        node = self.model.scene.contacts[contact].node
-        turn = None if node is None else self.rotation(node)
-        if node is None or turn is None:
-            return None
-        turned = quaternion.matrix(turn if self.model.space else quaternion.from_rotation_vector([0.0, 0.0, turn[0]]))
-        return turned, self.position(node) - turned @ np.asarray(self.model.scene.nodes[node].position)
+        return self._motions.get(contact)
+
+    @functools.cached_property
+    def _motions(self) -> dict[str, tuple[Array, Array]]:
+        """As of :meth:`motion_of`, of obstacles that move."""
+        found, space = dict[str, tuple[Array, Array]](), self.model.space
+        for name, contact in self.model.scene.contacts.items():
+            node = contact.node
+            turn = None if node is None else self.rotation(node)
+            if node is not None and turn is not None:
+                turned = quaternion.matrix(turn if space else quaternion.from_rotation_vector([0.0, 0.0, turn[0]]))
+                place = np.asarray(self.model.scene.nodes[node].position)
+                found[name] = turned, self.position(node) - turned @ place
+        return found
 
     def seen(self, contact: str, points: Array, tangents: Array) -> tuple[Array, Array]:
         """Points (n, 3), m, and vectors (n, 3) as an obstacle sees them that moves: as if it had not moved."""
