@@ -24,7 +24,7 @@ from .pairs import Near, PairKey
 
 __all__ = ["CENTRED", "FIRM", "Gripping", "Placed"]
 
-CENTRED = 1e-4
+CENTRED = 1e-5
 """Angle, rad, and share of the size of the scene, by which a point may have moved from where friction is set up there:
 what that leaves out is of second order.
 """

@@ -450,6 +450,12 @@ class Lines:
         ends, every = ends_of(lines), (*points, *new)
         points_within = (p for p in kept if all(p.sides) and self.has(p) and p.pair in lines)
         inner = [p for p in points_within if (p.pair, p.at[0]) not in ends and self._known_ends(mesh, every, p.pair)]
+        # Where both ends of a stretch are known nothing says where between them a place slides.
+        sliding = [p for p in kept if p.pair in lines and self.ends_slide([p])]
+        known_ends = {(p.pair, p.at[0]) for p in sliding}
+        spans = [(key, own[0], own[-1]) for key, each in lines.items() for own in each]
+        closed = [(key, a, b) for key, a, b in spans if {(key, a), (key, b)} <= known_ends]
+        inner += [p for p in sliding if any(p.pair == key and a < p.at[0] < b for key, a, b in closed)]
         return (*(p for p in kept if p not in inner), *new), len(new) + len(inner)
 
     def _within(

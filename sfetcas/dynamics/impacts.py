@@ -120,8 +120,8 @@ class Collision:
         """The energy that is lost where rows (rows,) of bool come to rest beside those that act before."""
         if not rests.any():
             return 0.0
-        free, held = self._allowed(before), self._allowed(before | rests)
-        return max(0.0, 0.5 * float(free @ free - held @ held))
+        free, held = (0.5 * float(w @ self._mass @ w) for w in (self._allowed(before), self._allowed(before | rests)))
+        return max(0.0, free - held)
 
     def independent(self, acting: Array, sticks: Array, pushes: Array) -> Array:
         """Which rows (m, axes - 1), 1 or 0, hold places that stick, none of which follows from others.

@@ -291,7 +291,8 @@ class Balance(Iterate):
     """An iterate of :func:`correct`, with its loading and relative residual.
 
     ``plain`` are the stationarity equations, ``point`` those that :meth:`System.seen` makes of them; ``over`` says that
-    further steps cannot improve it, ``stalls`` that the last one did not, but moved a place of contact.
+    further steps cannot improve it, ``stalls`` that the last one did not, but moved a place of contact, ``shortened``
+    that this one was shortened, so that it has not arrived.
     """
 
     plain: Point
@@ -299,6 +300,7 @@ class Balance(Iterate):
     residual: float
     over: bool = False
     stalls: bool = False
+    shortened: bool = False
 
 
 class Converged(NamedTuple):
@@ -352,7 +354,7 @@ class _Correction:
         if here.over or here.residual == 0.0:
             return True
         # One step is always taken: under a tiny load the residual of the unloaded state is below rounding already.
-        if not here.count:
+        if not here.count or here.shortened:
             return False
         exact = here.residual <= tolerances.EXACT and balanced(self.equations, here.point)
         return exact or self.system.suffices(here)
@@ -360,7 +362,8 @@ class _Correction:
     def after(self, here: Balance, step: Array) -> Balance | None:
         limits = self.limits
         slid = float(np.abs(step[self.equations.slid_places]).max(initial=0.0))
-        step = step * min(1.0, limits.slides / max(slid, TINY))
+        share = min(1.0, limits.slides / max(slid, TINY))
+        step = share * step
         length = largest_rotation(self.equations, step)
         self.lengths.append(length)
         grows = length > limits.most or length > max(limits.contraction * here.length, limits.short)
@@ -372,9 +375,11 @@ class _Correction:
         if len(step) > total:
             factor += float(step[total])
             moved = self.system.with_prescribed(moved, self.system.loading(factor))
-        there = self.at(moved, factor, length, here.count + 1)
+        there = replace(self.at(moved, factor, length, here.count + 1), shortened=share < 1.0)
         if not math.isfinite(there.residual):
             return None
+        if there.shortened:
+            return there
         if there.residual > 0.25 * here.residual and self._low(here):
             # Where a line ends is known to the root of the residual only: what is left of that goes in a further step.
             if not here.stalls and slid > PLACED:
