@@ -73,3 +73,27 @@ def test_a_line_whose_ends_alone_were_found_first_is_one_line(off):
     assert isinstance(floor["member"], str)
     # Where a line ends is known less well than positions.
     np.testing.assert_allclose(floor["at"], [begin, end], atol=1e-5)
+
+
+def drum_cantilever(steps, cut=None):
+    """`problems/drum_cantilever_tip_force.toml`, its beam in two at a node where that changes nothing."""
+    table = sfetcas.load("problems/drum_cantilever_tip_force.toml").to_dict()
+    table["analysis"] = {"accuracy": 1e-7, "steps": steps}
+    table.pop("expect")
+    if cut:
+        table["nodes"]["cut"] = {"position": [2.0 * cut, 0]}
+        ends = {"one": ["clamp", "cut"], "other": ["cut", "tip"]}
+        table["members"] = {name: {"nodes": nodes, "section": "strip"} for name, nodes in ends.items()}
+        table["contacts"]["drum"] = {**table["contacts"]["drum"], "members": list(ends)}
+        table["contacts"]["drum"].pop("member")
+    return sfetcas.solve(sfetcas.Scene.from_dict(table))
+
+
+@pytest.mark.parametrize(("steps", "cut"), [([8.0], 0.43), ([0.5, 1.2, 2.5, 6.0, 15.0], 0.45)])
+def test_a_line_that_goes_over_a_node_is_the_same_line(steps, cut):
+    """Where it ends is located also where no place slides there, and no element at the node is a sliver."""
+    for one, other in zip(drum_cantilever(steps).steps, drum_cantilever(steps, cut).steps, strict=True):
+        # The accuracy asked for, of the size of the scene.
+        np.testing.assert_allclose(other.position("tip"), one.position("tip"), atol=2e-7)
+        assert other.notes == one.notes
+        assert min(np.diff(cuts).min() for cuts in other.model.mesh.cuts.values()) > 1e-4

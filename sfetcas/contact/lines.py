@@ -70,6 +70,11 @@ SHARE = 0.25
 SLIVER = 0.25
 """Share of an element up to which its end is moved to a place, rather than that another one is made there."""
 
+BESIDE_NODE = 1e-3
+"""Share of an element up to which no end of elements is made beside a node of several members: what a force bends there
+is a millionth of what it bends in the element, and what is so short leaves rounding.
+"""
+
 AT_END, PARTED, FEW = 0.02, 1e-2, 3
 """Share of two elements up to which a place is where they meet; length, over the unit of length, of lines on the way up
 to which a point is parted into their ends; ends of elements on so short a line up to which it is seen as a point.
@@ -546,7 +551,14 @@ class Lines:
         moves = np.abs(breaks_of(self.scene, member) - cuts[near]).min() > SAME_CUT
         if moves and (keeps or abs(cuts[near] - x) < SLIVER * (cuts[e] - cuts[e - 1])):
             return np.where(np.arange(len(cuts)) == near, x, cuts)
-        return cuts if keeps else np.insert(cuts, e, x)
+        # Where another member goes on a line does, too.
+        goes_on = [float(end) for end, node in enumerate(self.scene.members[member].nodes) if self._shares(node)]
+        beside = cuts[near] in goes_on and abs(cuts[near] - x) < BESIDE_NODE * (cuts[e] - cuts[e - 1])
+        return cuts if keeps or beside else np.insert(cuts, e, x)
+
+    def _shares(self, node: str) -> bool:
+        """Whether several members end at a node."""
+        return sum(node in member.nodes for member in self.scene.members.values()) > 1
 
     def long(self, found: Solved) -> dict[str, Array]:
         """Marks of the elements, by member, that are not so short that what pushes at both ends is one force.
@@ -567,18 +579,18 @@ class Lines:
         """Marks of the elements, by member, in which lines end and where that is therefore not known well enough.
 
         There a force presses at a point, and where in the element is open: what that bends is an error of rotations.
-        Not of lines whose ends elements follow.
+        Not where a line ends at a place that slides.
         """
         fields, mesh = found.fields, found.model.mesh
         marks = {name: np.zeros(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
         pushes = {(p.pair, p.at[0]): fields.contact_point(p)["push"] for p in mesh.points}
-        scales = found.model.scales
+        scales, known = found.model.scales, {(p.pair, p.at[0]) for p in points_of(found) if self.ends_slide([p])}
         for key, stretches in self.stretches(found).items():
             first = key[1][0]
             lengths = np.diff(mesh.cuts[first]) * self.closest.lengths[first] / scales.length
-            for stretch in stretches if not self.chosen(key) else ():
+            for stretch in stretches:
                 for at, inner in ((stretch[0], stretch[1:2]), (stretch[-1], stretch[-2:-1])):
-                    if not 0.0 < at < 1.0:
+                    if not 0.0 < at < 1.0 or (key, at) in known:
                         continue
                     force = sum(pushes.get((key, x), 0.0) for x in {at, *inner}) / scales.force
                     cut = mesh.cut_at(first, at)
