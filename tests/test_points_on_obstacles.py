@@ -243,3 +243,29 @@ def test_straight_strip_whose_ends_come_nearer_by_a_history_bends_towards_a_plat
     np.testing.assert_allclose(by_history.position("C"), evenly.position("C"), atol=1e-9)
     assert by_history.position("C") == pytest.approx([0.49, 0.08, 0.0], abs=1e-4)
     np.testing.assert_allclose(force_of(by_history), force_of(evenly), rtol=1e-8)
+
+
+@pytest.mark.parametrize("spread", [False, True])
+def test_a_rod_on_the_axis_of_a_tube_comes_down_as_on_a_floor(spread):
+    """Seen from its axis a tube is as far everywhere; along it a rod is not bent, however thin it is."""
+    radius, way = 0.01, np.array([0.0, -0.8, 0.6])
+
+    def found(contact, load):
+        loads = {"F": {"type": "distributed", "member": "beam", "value": load}}
+        loads = loads if spread else {"F": {"type": "force", "node": "B", "value": load}}
+        ends = {"A": {"position": [0, 0, 0], "support": "clamped"}, "B": {"position": [1, 0, 0]}}
+        ends["B"] |= {"support": "slider", "direction": [1, 0, 0]} if spread else {}
+        section = {"EI3": 1.0} if len(load) == 2 else {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0}
+        contact = {**contact, "members": "all"}
+        more = {"nodes": ends, "sections": {"s": section}, "loads": loads, "contacts": {"c": contact}}
+        return solve(cantilever({}, **more)).last
+
+    size = 60.0 if spread else 1.0
+    tube = {"type": "cylinder", "center": [0, 0, 0], "axis": [1, 0, 0], "radius": radius, "side": "inside"}
+    one = found(tube, (size * way).tolist())
+    other = found({"type": "plane", "point": [0, -radius], "normal": [0, 1]}, [0, -size])
+    np.testing.assert_allclose(force_of(one), -way * force_of(other)[1], atol=1e-5 * size)
+    for x in (0.25, 0.5, 1.0):
+        here, there = (step.along("beam", [x])["position"][0] for step in (one, other))
+        np.testing.assert_allclose(here, [there[0], *(-there[1] * way[1:])], atol=2e-7)
+    assert one.model.mesh.elements <= 2 * other.model.mesh.elements

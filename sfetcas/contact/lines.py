@@ -18,7 +18,7 @@ import numpy as np
 
 from .. import tolerances
 from ..description.scene import Scene
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Mesh, breaks_of
 from ..mechanics.segments import SAME_CUT, standing
@@ -302,9 +302,9 @@ class Lines:
     def _as_line(self, found: Solved, mesh: Mesh, pair: Pair, places: Sequence[float]) -> tuple[Mesh, Points]:
         """A mesh and points where a pair that touches at some places is a line from now on."""
         self.keys |= {pair.key}
-        longest = self._longest(pair, places)
+        longest = self._longest(found.fields, pair, places)
         low, high = min(places) - longest, max(places) + longest
-        mesh = self.divided(replace(mesh, points=()), pair, places)
+        mesh = self.divided(found.fields, replace(mesh, points=()), pair, places)
         near = self.closest.along(found.fields, pair, mesh, 0.1 * pair.width)
         own = [point for point in points_of(found) if point.pair == pair.key and beside_ends(point)]
         # What touches elsewhere does so at the nearest ends of elements.
@@ -350,15 +350,19 @@ class Lines:
             x for x, node in zip((0.0, 1.0), self.scene.members[pair.members[0]].nodes, strict=True) if node in nodes
         ]
 
-    def _longest(self, pair: Pair, places: Sequence[float]) -> float:
+    def _longest(self, fields: Fields, pair: Pair, places: Sequence[float]) -> float:
         """Longest part of the first member of a pair between places of a line, a fraction of its length."""
-        length = self.closest.lengths[pair.members[0]]
+        member, length, turn = pair.members[0], self.closest.lengths[pair.members[0]], pair.turn
+        if pair.stop is not None:
+            # Along the axis of a cylinder members are not bent, however thin that is.
+            _, tangents = fields.seen(pair.contact, np.zeros((1, 3)), fields.tangents(member, np.array(places)))
+            turn /= max(float(((tangents @ pair.stop.across) ** 2).sum(axis=1).max()), TINY)
         longest = max((max(places) - min(places)) / SHORT, 0.5 * pair.width / length)
-        return float(min(longest, ROUND * pair.turn / length)) * self.finer
+        return float(min(longest, ROUND * turn / length)) * self.finer
 
-    def divided(self, mesh: Mesh, pair: Pair, places: Sequence[float]) -> Mesh:
+    def divided(self, fields: Fields, mesh: Mesh, pair: Pair, places: Sequence[float]) -> Mesh:
         """A mesh with elements of the first member that are not too long near the places of a line."""
-        first, longest = pair.members[0], self._longest(pair, places)
+        first, longest = pair.members[0], self._longest(fields, pair, places)
         low, high = min(places) - longest, max(places) + longest
         while first not in self.fixed:
             cuts = mesh.cuts[first]

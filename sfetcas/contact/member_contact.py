@@ -274,7 +274,7 @@ class MemberContact:
             lies = any(self.closest.lies(fields, pair.key, a, b) for a, b in itertools.pairwise(cuts.tolist()))
             if along and lies and self.lines.bends(member):
                 self.lines.keys |= {pair.key}
-                mesh = self.lines.divided(mesh, pair, [near.at[0] for near in along])
+                mesh = self.lines.divided(fields, mesh, pair, [near.at[0] for near in along])
                 along = self.closest.along(fields, pair, mesh, close)
                 # The line has what it ends at, not the member beside it.
                 found = {key: near for key, near in found.items() if near.pair != pair.key}

@@ -176,7 +176,8 @@ class Gap(Term):
             return ca.dot(ways[0], between) - distance
         if self.across:
             between = between - ca.dot(ways[0], between) * ways[0]
-        return (-1.0 if self.inside else 1.0) * ca.norm_2(between) - distance
+        # On the axis of what is hollow there is no direction.
+        return (-1.0 if self.inside else 1.0) * ca.sqrt(ca.sumsqr(between) + NOWHERE) - distance
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """The contact force, above zero where it is a push."""
@@ -286,7 +287,7 @@ LEAST_YIELDING = 1e-13
 """How far what is rough gives way over the force, dimensionless, at least: rounding then does not decide how."""
 
 NOWHERE = 1e-40
-"""Square of a force and a slip that have no direction."""
+"""Square of a force, a slip and a distance that have no direction."""
 
 
 def undeformed_vectors(scene: Scene, points: Sequence[ContactPoint]) -> list[Array]:

@@ -164,7 +164,7 @@ class Lying:
             pair = run.closest.pairs[key]
             places = [x for part in stretches for x in part]
             sliding = tuple(ContactPoint(*key, (x,), (True,), pair.distance) for x in places)
-            mesh, _ = lines.fitted(lines.divided(mesh, pair, places), sliding)
+            mesh, _ = lines.fitted(lines.divided(source.fields, mesh, pair, places), sliding)
         for key, stretches in parts.items():
             near = run.closest.along(source.fields, run.closest.pairs[key], mesh, np.inf)
             laid = lines.laid(one for one in near if any(a <= one.at[0] <= b for a, b in stretches))
