@@ -1111,3 +1111,25 @@ def test_a_tip_that_just_catches_a_peg_does_not_pass_through_it(steps):
     # The angle at A of the triangle with sides of the bar, of the radius and to the peg.
     below = np.arctan2(peg[1], peg[0]) - np.arccos((1.0 + away**2 - 0.1405**2) / (2.0 * away))
     np.testing.assert_allclose(last.position("B")[:2], [np.cos(below), np.sin(below)], rtol=0, atol=1e-9)
+
+
+def test_what_is_soft_bends_at_the_begin_without_a_jump():
+    """The line of a fishing rod runs through rings: it bends by a millionth of the load, which is no snap."""
+    nodes = {"butt": {"position": [0, 0], "support": "clamped"}, "tip": {"position": [2, 0]}}
+    nodes |= {"ring": {"position": [2, -0.02]}, "fish": {"position": [3, -0.02]}}
+    nodes |= {"reel": {"position": [0.2, -0.02], "support": "hinge"}}
+    members = {"rod": {"nodes": ["butt", "tip"], "section": "rod"}, "eye": {"nodes": ["tip", "ring"], "type": "rigid"}}
+    table = {
+        "sections": {"rod": {"EI3": 8.0}, "line": {"EI3": 1e-4}},
+        "nodes": nodes,
+        "members": members | {"line": {"nodes": ["reel", "fish"], "section": "line"}},
+        "rings": {"ring": {"node": "ring", "member": "line"}},
+        "loads": {"fish": {"type": "force", "node": "fish", "value": [0, -10]}},
+        "contacts": {"water": {"type": "plane", "point": [0, -1.9], "normal": [0, 1], "members": ["line"]}},
+        "analysis": {"accuracy": 1e-5},
+    }
+    step = solve(made(table)).last
+    assert step.notes == ()
+    held = step.contacts["water"]["force"] if step.contacts["water"]["at"] is not None else np.zeros(3)
+    up = sum(step.reaction(node)[0][1] for node in ("butt", "reel")) + np.sum(np.atleast_2d(held), axis=0)[1]
+    assert up == pytest.approx(10.0, abs=1e-6)

@@ -90,8 +90,10 @@ FITS = 3
 PATIENT = 2.0**-6
 """Step down to which the ends of lines are followed; in shorter ones they are sought anew."""
 
-NARROW = 2.0**-8
-"""Step below which a loss of stability is taken for located, part of the way."""
+NARROW, EARLIEST, SOONER = 2.0**-8, 2.0**-30, 1.0 / 16.0
+"""Step below which a loss of stability is taken for located, part of the way; the same of the first step; what that is
+multiplied by where it is too long, and share of what is behind that steps need not fall below at first.
+"""
 
 NEAREST = 1e-3
 """Slope of the distance along a member up to which a place is taken for the nearest one."""
@@ -817,6 +819,8 @@ class MemberContact:
         turn = way(1.0)(start.model).plus(way(0.0)(start.model).scaled(-1.0)).turned if start.model.space else 0.0
         while now.part < 1.0:
             self.reached = now
+            # What is soft bends at the begin by small shares of the loads.
+            narrow = min(NARROW, SOONER * now.part) if now.part > 0.0 else EARLIEST
             part, lines = min(1.0, now.part + min(step, 1.0 / max(turn, 1.0))), self.lines.keys
             self.patient = step > PATIENT
             there = self._next(mesh, now.solved, way(part))
@@ -832,22 +836,22 @@ class MemberContact:
                     continue
             finer = None if there is None else self._refined(there, way(part))
             # In the shortest steps what no finer mesh has goes on as it is: the answer is refined all the same.
-            there = there if finer is None and step <= NARROW else finer
+            there = there if finer is None and step <= narrow else finer
             mesh = mesh if there is None else replace(there.model.mesh, points=())
             turned = 0.0 if there is None else tangents_turned(now.solved.fields, there.fields)
             falling = there is not None and self.unstable(there, way(part))
             # What turns so much faster than before may have gone over to another branch.
             sudden = turned > max(TOLD, SUDDEN * pace * (part - now.part)) and pace > 0.0
             aside = there is not None and self.passing.aside(now.solved.fields, there.fields)
-            if there is None or ((falling or sudden or aside) and step > NARROW):
+            if there is None or ((falling or sudden or aside) and step > narrow):
                 # What was taken for a line on the way to a state that is not taken is none.
-                step, self.lines.keys = 0.5 * (part - now.part), lines
-                if there is None and step < NARROW and left < now.part:
+                step, self.lines.keys = (0.5 if now.part > 0.0 else SOONER) * (part - now.part), lines
+                if there is None and step < narrow and left < now.part:
                     # Where a branch of equilibria ends what moves on comes to rest on another one.
                     left, there = now.part, self._fallen_from(mesh, now, part, way(part))
                     now, step = (now, step) if there is None else (_Step(part, there), self.first)
                     mesh = mesh if there is None else replace(there.model.mesh, points=())
-                elif there is None and step < SHORTEST:
+                elif there is None and step < SHORTEST * narrow / NARROW:
                     return None
                 continue
             assert there is not None
