@@ -250,3 +250,26 @@ def test_radius_of_a_drum_on_which_a_member_begins():
     smaller = solve(scene.replace({"contacts.c.radius": 0.2 - 1e-5})).last.position("B")
     slope = found.jacobian["nodes.B.position"]["contacts.c.radius"]
     np.testing.assert_allclose((found["nodes.B.position"] - smaller) / 1e-5, np.ravel(slope), atol=2e-3)
+
+
+def test_a_slider_is_not_driven_along_its_guide_by_a_vector_of_numbers():
+    """The component across it is one, also by default; a vector is refused: with it the guide would be driven."""
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {
+            "root": {"position": [0, 0], "support": "clamped"},
+            "tip": {"position": [1, 0], "support": "slider", "direction": [1, 0], "rotation": "hinge"},
+        },
+        "members": {"b": {"nodes": ["root", "tip"], "section": "s"}},
+        "motions": {"down": {"node": "tip", "displacement": [0, -0.1]}},
+        "contacts": {"peg": {"type": "circle", "center": [0.5, -0.03], "radius": 0.02, "member": "b"}},
+        "analysis": {"accuracy": 1e-8},
+    }
+    scene, number = Scene.from_dict(table), "motions.down.displacement.1"
+    with pytest.raises(SceneError, match=rf"drive along its guide, accepted: {number}, across it"):
+        parametric(scene, ["motions.down.displacement"], ["reactions.tip.force"])
+    assert number in parametric(scene).solve().values
+    answer = parametric(scene, [number], ["reactions.tip.force"]).solve()
+    up, down = (solve(scene.replace({number: -0.1 + way})).last.reaction("tip")[0][1] for way in (1e-5, -1e-5))
+    # Accuracy over the step.
+    assert answer.flat_jacobian[1, 0] == pytest.approx((up - down) / 2e-5, rel=1e-4)

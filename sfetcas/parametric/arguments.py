@@ -18,6 +18,7 @@ from ..description.changes import FACTOR, branch_of, carry_ends, with_entries
 from ..description.records import Record, keys_of, name_of, plain, unknown
 from ..description.scene import History, Scene
 from ..description.showing import made, named
+from ..description.supports import drives
 from ..errors import SceneError
 from ..mathematics.active import Active, gathered
 from ..mathematics.arrays import Array, numbers
@@ -262,9 +263,39 @@ def default_arguments(scene: Scene) -> list[str]:
     for name, source in scene.fields.items():
         names += [f"fields.{name}.{key}" for key in ("value", "moment") if getattr(source, key) is not None]
     for name, motion in scene.motions.items():
-        keys = ("displacement", "rotation")
-        names += [f"motions.{name}.{key}" for key in keys if getattr(motion, key) is not None]
+        along = _along_guide(scene, name)
+        if motion.displacement is not None and along:
+            names += [f"motions.{name}.displacement.{i}" for i in _axes(scene) if i not in along]
+        elif motion.displacement is not None:
+            names.append(f"motions.{name}.displacement")
+        names += [f"motions.{name}.rotation"] if motion.rotation is not None else []
     return names
+
+
+def _axes(scene: Scene) -> range:
+    """Numbers of the axes in which things move."""
+    return range(2 if scene.resolved_dimension == "plane" else 3)
+
+
+def _along_guide(scene: Scene, motion: str) -> list[int]:
+    """Components of the displacement of a motion that would drive a slider along its guide, where it does not."""
+    moved = scene.motions[motion]
+    node = None if moved.node is None else scene.nodes[moved.node]
+    if node is None or not node.slides or node.direction is None or drives(node, moved.displacement):
+        return []
+    return [i for i, share in enumerate(node.direction) if share]
+
+
+def _check_guide(scene: Scene, name: str) -> None:
+    """Refuse a number with which a slider would be driven along its guide, on which it moves freely."""
+    _, motion, _, *component = name.split(".")
+    along = _along_guide(scene, motion)
+    wrong = along if not component else [i for i in along if i == int(component[0])]
+    if wrong:
+        accepted = [f"motions.{motion}.displacement.{i}" for i in _axes(scene) if i not in along]
+        message = f"found with nodes.{scene.motions[motion].node}, which it would drive along its guide"
+        what = f"{' or '.join(accepted)}, across it" if accepted else "a displacement in fixed axes along the guide"
+        raise SceneError(f"{message}, accepted: {what}", ("arguments", name))
 
 
 def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -> Argument:
@@ -284,6 +315,8 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
     found = _argument(scene, name, low, high)
     if MOVING.fullmatch(name) or SLIDING.fullmatch(name):
         found = _within(scene, found)
+    if re.fullmatch(r"motions\.[^.]+\.displacement(\.\d)?", name):
+        _check_guide(scene, name)
     outside = [x for x in found.default if not found.limits[0] <= x <= found.limits[1]]
     if outside:
         message = f"found {outside[0]:g} in the scene, accepted: a range from low to high that has it"
