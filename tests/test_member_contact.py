@@ -358,11 +358,28 @@ def test_members_at_random_that_were_refused(kind, seed, forces):
     assert sum(np.linalg.norm(force) > 0.0 for force in np.reshape(step.contacts["c"]["force"], (-1, 3))) >= forces
 
 
-def test_a_hinge_between_two_members_is_pushed_through_both():
-    """The node is the end of one and the beginning of the other: balance is that of both with half of the push each."""
+def test_a_hinge_between_two_members_is_pushed_once():
+    """The node is the end of one and the beginning of the other: it touches at one place, and all balances."""
     step = solve(Scene.from_dict(member_scene("hinged", 0))).last
-    assert {(m, x) for m, x in zip(step.contacts["c"]["member"], step.contacts["c"]["at"])} == {("a", 1.0), ("b", 0.0)}
+    assert (step.contacts["c"]["member"], step.contacts["c"]["at"]) == ("a", 1.0)
     assert wrong_contacts(step) == []
+
+
+def test_beams_in_halves_touch_once_where_they_are_cut():
+    """Both middles are nodes: one touch with one force, that of the supports of the lower beam, not four quarters."""
+    nodes, members = {}, {}
+    for name, y in {"a": 0.05, "b": 0.0}.items():
+        for at, direction in (("0", [1, 0]), ("m", [0, 1]), ("1", [1, 0])):
+            place = [{"0": -1.0, "m": 0.0, "1": 1.0}[at], y]
+            nodes[f"{name}{at}"] = {"position": place, "support": "slider", "direction": direction}
+        members |= {f"{name}{k}": {"nodes": [f"{name}{one}", f"{name}{two}"]} for k, one, two in ("l0m", "rm1")}
+    loads = {"f": {"type": "force", "node": "am", "value": [0, -8]}}
+    step = solve(scene_of(nodes, members, loads=loads, radius=0.01, analysis={"accuracy": 1e-7})).last
+    touch, held = step.contacts["pair"], step.reaction("b0")[0] + step.reaction("b1")[0]
+    assert (touch["member"], touch["at"], touch["other"], touch["other_at"]) == ("al", 1.0, "bl", 1.0)
+    np.testing.assert_allclose(touch["force"], held, atol=1e-9)
+    assert held[1] > 1.0
+    assert step.certificate.stable is True
 
 
 def test_half_rings_pressed_on_each_other_touch_where_they_push():

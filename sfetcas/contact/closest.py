@@ -194,13 +194,37 @@ class Closest:
         ]
 
     def _once_each(self, found: Iterable[Near]) -> list[Near]:
-        """Minima without those that are as good as nearer ones."""
-        kept: dict[PairKey, list[Near]] = {}
+        """Minima without those that are as good as nearer ones, also on members that end at the same node."""
+        kept, at_node = dict[PairKey, list[Near]](), dict[tuple[str, str], list[Near]]()
         for near in found:
             known = kept.setdefault(near.pair, [])
-            if not any(self.alike(near.pair, near.at, other.at) for other in known):
-                known.append(near)
+            ends = [at_node.setdefault((near.contact, node), []) for node in self.nodes(near)]
+            same = any(self.alike(near.pair, near.at, other.at) for other in known)
+            if not same and not any(self.one_place(near, other) for own in ends for other in own):
+                for own in (known, *ends):
+                    own.append(near)
         return [near for known in kept.values() for near in known]
+
+    def nodes(self, one: ContactPoint | Near) -> list[str]:
+        """The nodes at which a place is."""
+        found = (self._node(member, x) for member, x in zip(one.members, one.at, strict=True))
+        return [node for node in found if node]
+
+    def _node(self, member: str, x: float) -> str:
+        """The node at a place of a member; none within it."""
+        return self.scene.members[member].nodes[int(x)] if x in (0.0, 1.0) else ""
+
+    def one_place(self, one: ContactPoint | Near, other: ContactPoint | Near) -> bool:
+        """Whether places on two members each are one as members end at the same nodes there, or are the same."""
+        if one.contact != other.contact or len(one.at) < 2 or len(other.at) < 2:
+            return False
+        width = SAME * min(self.pairs[one.pair].width, self.pairs[other.pair].width)
+
+        def same(i: int, k: int) -> bool:
+            (a, x), (b, y) = (one.members[i], one.at[i]), (other.members[k], other.at[k])
+            return (a == b and abs(x - y) * self.lengths[a] < width) or self._node(a, x) == self._node(b, y) != ""
+
+        return (same(0, 0) and same(1, 1)) or (same(0, 1) and same(1, 0))
 
     def gap(self, fields: Fields, contact: str) -> float | None:
         """Smallest distance of the surfaces of a contact, m; None of members that are nowhere near to each other."""
@@ -488,11 +512,23 @@ def _entry(fields: Fields, point: ContactPoint) -> dict[str, Any]:
     entry |= {"friction": told["friction"], "sticking": told["sticks"]} if point.grip is not None else {}
     if len(places) == 2:
         gap = float(np.linalg.norm(places[0] - places[1])) - point.distance
-        return {**entry, "gap": gap, "other": point.members[1], "other_at": told["at"][1]}
+        one, other = (_first(fields.model.scene, point, m, x) for m, x in zip(point.members, told["at"], strict=True))
+        named = {"member": one[0], "at": one[1], "other": other[0], "other_at": other[1]}
+        return {**entry, **named, "gap": gap}
     stop = fields.model.scene.obstacles[point.contact]
     seen = fields.seen(point.contact, places[0][None], fields.tangents(point.members[0], np.array(told["at"])))
     gap = stop.gaps(*seen, way=point.edge or 1.0)[0]
     return {**entry, "gap": float(gap) - fields.model.scene.contacts[point.contact].member_radius}
+
+
+def _first(scene: Scene, point: ContactPoint, member: str, x: float) -> tuple[str, float]:
+    """A place of a member of a point; at a node that of the first member of the contact that ends there."""
+    if x not in (0.0, 1.0):
+        return member, x
+    node, taking = scene.members[member].nodes[int(x)], members_of(scene.contacts[point.contact], scene.members)
+    ends = ((name, scene.members[name].nodes) for name in scene.members if name in taking)
+    name, nodes = next((name, nodes) for name, nodes in ends if node in nodes and scene.members[name].type != "small")
+    return name, float(nodes.index(node))
 
 
 def _stretches(

@@ -726,7 +726,9 @@ class MemberContact:
     def _same(self, point: ContactPoint | Near, other: ContactPoint) -> bool:
         # What is new on an edge slides by more than its width.
         near = bool(other.edge) and other.new
-        return point.pair == other.pair and (near or self.closest.alike(point.pair, point.at, other.at, ONE))
+        if point.pair != other.pair:
+            return self.closest.one_place(point, other)
+        return near or self.closest.alike(point.pair, point.at, other.at, ONE)
 
     def _freed(
         self,
