@@ -958,3 +958,19 @@ def test_bifurcations_are_kept_where_stiff_members_leave_few_digits_of_eigenvalu
     assert sways == pytest.approx(np.pi**2, rel=1e-4)
     np.testing.assert_allclose(alone, 4.0 * np.pi**2, rtol=1e-4)
     assert alone
+
+
+def test_a_path_that_ends_before_its_range_does_is_cut():
+    """After as many points as are taken by default; where a number is given that many are asked for."""
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "loads": {"M": {"type": "moment", "node": "B", "value": 1.0}},
+        "analysis": {"type": "path", "range": [0, 1e3]},
+    }
+    scene = Scene.from_dict(table)
+    path = solve(scene)
+    assert path.status is Status.CUT
+    assert "200 points" in path.main.end
+    assert solve(scene.replace({"analysis.points": 20})).status is Status.SOLVED

@@ -496,7 +496,9 @@ class PathTracing:
             stretch = replace(stretch, traced=level.choices.fitted(stretch.traced))
             branches.append(self.answered(curve.prepared, stretch, own))
         status = Status.SHORT if largest > self.accuracy and self.asked else Status.SOLVED
-        if level.stretches[0].traced.end in ("lost", "bent", "margin"):
+        # A number of points that is given is asked for.
+        given = "points" in self.scene.analysis.model_fields_set
+        if level.stretches[0].traced.end in ("lost", "bent", "margin", *([] if given else ["points"])):
             status = Status.CUT
         final = level.stretches[-1].traced.points[-1]
         steps = [entry for branch in branches for entry in branch.steps]
