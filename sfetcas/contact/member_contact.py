@@ -626,6 +626,8 @@ class MemberContact:
             if lined is not None:
                 (mesh, points), several = lined, False
             else:
+                # Where nothing of a line touches it is none: between ends of elements nothing would be seen.
+                self.lines.keys &= {point.pair for point in found.model.mesh.points}
                 points, changes = self._changed(found, tried, careful, ends)
                 several = changes > 1 and not careful
                 if ends:
