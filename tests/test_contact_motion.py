@@ -11,7 +11,8 @@ from scipy.optimize import brentq
 import sfetcas
 from sfetcas import Scene, SceneError, dump, solve
 from sfetcas.cli import main
-from sfetcas.dynamics.impacts import Collision
+from sfetcas.dynamics.impacts import Collision, Impacts
+from sfetcas.mechanics.equations import State
 from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.spots import fine_enough, spots_of
 
@@ -187,6 +188,32 @@ def test_impulses_with_restitution():
         np.testing.assert_array_less(rebound, restitution * np.maximum(speed, 0.0) + 1e-15)
         if same:
             np.testing.assert_allclose(rebound, restitution * np.maximum(speed, 0.0))
+
+
+def test_what_comes_to_rest_loses_what_its_momenta_say(monkeypatch):
+    """Of nearest velocities with and without rows that rest, the kinetic energy is half of velocities times momenta."""
+    seen, at = [], Impacts.at
+
+    def looked(impacts, memory):
+        seen.append((impacts, memory, at(impacts, memory)))
+        return seen[-1][-1]
+
+    monkeypatch.setattr(Impacts, "at", looked)
+    solve(made(rod(0.3, 0.1, {"end": 0.3, "step": 0.02}, kind="flexible")))
+    system, lost = seen[0][0].system, []
+    for impacts, memory, collision in seen[::10]:
+        state = State(memory.q, memory.y, memory.lam, memory.unwrapped)
+        given = state.q.T, state.y, system.factors(memory.t), system.counted(state)
+
+        def kinetic(acting, given=given, impacts=impacts, collision=collision):
+            velocity = collision.nearest(acting)
+            momentum = np.array(impacts.momenta(*given, velocity)[2]).ravel()
+            return 0.5 * (collision._allowed(acting) * collision._unit) @ momentum
+
+        moving, resting = np.zeros(len(collision._rows), bool), np.ones(len(collision._rows), bool)
+        lost.append(collision.held_back(moving, resting))
+        assert lost[-1] == pytest.approx(kinetic(moving) - kinetic(resting), rel=1e-6, abs=1e-12)
+    assert max(lost) > 1e-3
 
 
 # -- sliding and lifting off --------------------------------------------------------------------------------
