@@ -165,6 +165,8 @@ def test_a_fall_by_a_few_degrees_is_told():
         ("drums", 4056),
         # A fall of more than eighty steps.
         ("floors", 3048),
+        # It snaps off what it has lain along, of which nothing touches while it falls.
+        ("drums", 9150),
     ],
 )
 def test_scenes_at_random_that_were_lost_are_as_the_chain(family, seed):
@@ -184,3 +186,11 @@ def test_soft_obstacles_snap_before_their_time():
     assert not hard.snapped
     assert not step.notes
     assert step.position("B") == pytest.approx(hard.nodes["B"], abs=3.0 * hard.error)
+
+
+def test_a_way_that_leads_close_past_a_bifurcation_says_so():
+    """A path turns twice within a thousandth of the loads, to one side; load steps go on to the other one."""
+    table = contact_scene("spheres", 9202)
+    (note,) = solve(Scene.from_dict(table)).last.notes
+    assert note.startswith("near factor 0.1")
+    assert "unstable equilibrium is beside the way" in note

@@ -147,6 +147,9 @@ so short a step a state that goes on turns by less than a fifth of that.
 MOST_FALLS = 12
 """Unstable states on a way that are left, and ends of branches, at most."""
 
+BESIDE = "an unstable equilibrium is beside the way: what is a little imperfect may go to its other side"
+"""What a note says where the way goes on that comes near to another branch."""
+
 ENDED = "no equilibrium was near beyond it"
 """What a note says of a place on the way from which nothing led on but a fall."""
 
@@ -207,6 +210,7 @@ class MemberContact:
         self.gripping = Gripping(scene, self.closest)
         self.stride, self.first, self.rough = STRIDE, FIRST, ROUGH
         self.jumps: list[tuple[float, str]] = []
+        self.beside: list[float] = []
         self.redundant: bool | None = None
         self._loose: frozenset[str] | None = None
         self.lines = Lines(scene, self.closest, fixed)
@@ -816,7 +820,8 @@ class MemberContact:
 
     def follow(self, way: Callable[[float], Way], start: Solved) -> Solved | None:
         """The state at the end of a way, ``way(1)``, from its begin; None if it is lost."""
-        self.jumps, self.falls, mesh = [], 0, replace(start.model.mesh, points=())
+        self.jumps, self.beside, self.falls, mesh = [], [], 0, replace(start.model.mesh, points=())
+        unstable: _Step | None = None
         self.patient = False
         now, step, left, pace = _Step(0.0, start), self.first, -1.0, 0.0
         # In space what is driven by a whole turn looks as if it were not.
@@ -848,6 +853,7 @@ class MemberContact:
             sudden = turned > max(TOLD, SUDDEN * pace * (part - now.part)) and pace > 0.0
             aside = there is not None and self.passing.aside(now.solved.fields, there.fields)
             if there is None or ((falling or sudden or aside) and step > narrow):
+                unstable = _Step(part, there) if there is not None and falling else unstable
                 # What was taken for a line on the way to a state that is not taken is none.
                 step, self.lines.keys = (0.5 if now.part > 0.0 else SOONER) * (part - now.part), lines
                 if there is None and step < narrow and left < now.part:
@@ -867,6 +873,11 @@ class MemberContact:
                 there = rest
             elif sudden:
                 self.jumps.append((part, ENDED))
+            if unstable is not None and part >= unstable.part:
+                # The way goes on beside what a longer step had found.
+                near = tangents_turned(unstable.solved.fields, there.fields) < TOLD
+                self.beside += [unstable.part] if near and not falling else []
+                unstable = None
             # As long as turns by a little less than a stride.
             longer = min(2.0, AIM * self.stride / max(turned, 0.1 * self.stride))
             pace = turned / (part - now.part) if not falling else 0.0
@@ -1026,4 +1037,6 @@ class MemberContact:
 
     def notes(self, begin: float, end: float) -> tuple[str, ...]:
         """What is said of the last way, between two factors."""
-        return tuple(f"jumped {near_factor(begin + part * (end - begin))}: {how}" for part, how in self.jumps)
+        jumps = (f"jumped {near_factor(begin + part * (end - begin))}: {how}" for part, how in self.jumps)
+        beside = (f"{near_factor(begin + part * (end - begin))} {BESIDE}" for part in self.beside)
+        return (*jumps, *beside)
