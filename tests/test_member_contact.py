@@ -251,6 +251,28 @@ def test_heavy_ropes_that_stretch_cross_each_other():
     assert step.certificate.stable is True
 
 
+@pytest.mark.parametrize(
+    ("stretch", "force", "height"), [(False, 0.27210507, -0.28272739), (True, 0.26679308, -0.28791540)]
+)
+def test_stiffer_ropes_cross_where_they_are_kept_from_leaning(stretch, force, height):
+    """By themselves they lean to a side, which is lower; guides in their middles hold them in the planes of the source,
+    and there, where four halves end, they touch once.
+    """
+    table = load(Path(__file__).parents[1] / "problems" / "ropes_crossing.toml").replace(expect=()).to_dict()
+    table["sections"]["rope"] |= {"E": 1e6, "stretch": stretch}
+    for name, height_of in (("a", 0.0), ("b", 0.1)):
+        guide = {"support": "slider", "direction": [0, 0, 1], "rotation": "ball"}
+        table["nodes"][f"{name}m"] = {"position": [0, 0, height_of], **guide}
+    halves = {f"{n}{k}": [f"{n}{one}", f"{n}{two}"] for n in "ba" for k, one, two in ("l0m", "rm1")}
+    table["members"] = {name: {"nodes": nodes, "section": "rope"} for name, nodes in halves.items()}
+    table["contacts"] = {"crossing": {"type": "members", "members": "all"}}
+    table["analysis"] = {"accuracy": 1e-6}
+    step = solve(Scene.from_dict(table)).last
+    # As where they stretch.
+    np.testing.assert_allclose(step.contacts["crossing"]["force"], [0.0, 0.0, force], atol=1e-6)
+    assert step.position("am")[2] == pytest.approx(height, abs=1e-6)
+
+
 def scene_of(nodes, members, *, radius=RADIUS, **others):
     """Members of a section that has a mass, all of which may touch each other and themselves."""
     table = {

@@ -974,3 +974,14 @@ def test_a_path_that_ends_before_its_range_does_is_cut():
     assert path.status is Status.CUT
     assert "200 points" in path.main.end
     assert solve(scene.replace({"analysis.points": 20})).status is Status.SOLVED
+
+
+@pytest.mark.parametrize(("pull", "moment"), [(1.0, 9.134730089), (10.0, 10.428856439)])
+def test_a_clamped_rod_that_is_pulled_leaves_the_straight_line_at_a_larger_twist(pull, moment):
+    """M L / B at T L^2 / B, from the roots of Greenhill's equation for clamped ends; without a pull as the problem."""
+    scene = load("problems/twisted_rod_clamped.toml").replace(expect=())
+    load_ = {"type": "force", "node": "last", "value": [pull, 0, 0], "history": "always"}
+    changes = {"analysis.range": [0, 15], "loads.pull": load_, "histories.always": {"t": [0], "value": [1]}}
+    path = solve(scene.replace(changes))
+    # Its stiffness against twist is 0.75; factors are located to 1e-8 of themselves.
+    assert 0.75 * path.bifurcations[0].factor == pytest.approx(moment, rel=1e-8)

@@ -404,7 +404,10 @@ def test_what_begins_inside_is_refused():
     table = bars("rigid", 0.1)
     for node in "cd":
         table["nodes"][node]["position"][1] = 0.01
-    with pytest.raises(SceneError, match=r"contacts.c: members 'n' and 'm' penetrate by 0.01 m at t = 0"):
+    with pytest.raises(
+        SceneError,
+        match=r"contacts.c: members 'n' and 'm' penetrate by 0.01 m at [\d.]+ and [\d.]+ of their lengths at t = 0",
+    ):
         stepped(table, 0.01)
 
 

@@ -630,9 +630,9 @@ class MemberContact:
             if lined is not None:
                 (mesh, points), several = lined, False
             else:
-                # Where nothing of a line touches it is none: between ends of elements nothing would be seen.
-                self.lines.keys &= {point.pair for point in found.model.mesh.points}
                 points, changes = self._changed(found, tried, careful, ends)
+                if not changes and self._unseen(found):
+                    points, changes = self._changed(found, tried, careful, ends)
                 several = changes > 1 and not careful
                 if ends:
                     self.lines.forget(found, mesh, points)
@@ -650,6 +650,16 @@ class MemberContact:
                     most = max(most, points, key=len)
             source, solved = found, True
         return None
+
+    def _unseen(self, found: Solved) -> bool:
+        """Whether members are inside of what they touched along lines of which nothing touches: these are none, then,
+        as between ends of elements nothing would be seen.
+        """
+        touching = {point.pair for point in found.model.mesh.points}
+        gone = self.lines.keys - touching
+        inside = bool(gone) and self.penetration(found.fields, [self.closest.pairs[key] for key in sorted(gone)])
+        self.lines.keys -= gone if inside > self.tolerance else set()
+        return inside > self.tolerance
 
     def _changed(self, found: Solved, tried: set[object], careful: bool, ended: bool) -> tuple[Points, int]:
         """The points to try next, where they are now, and how many are others than before; at most one if careful.

@@ -577,10 +577,11 @@ class Stepping(Integrator):
         gaps = touching.nearby.gaps(pose.curve, found)
         deep = gaps < -tolerances.CLOSED * self.system.model.scene.size / touching.unit
         for k in np.flatnonzero(deep).tolist():
-            pair = touching.nearby.pairs[found.pairs[k]]
-            detail = (
-                f"members {pair.members[0]!r} and {pair.members[1]!r} penetrate by {-gaps[k] * touching.unit:.3g} m"
-            )
+            pair, lines = touching.nearby.pairs[found.pairs[k]], touching.nearby.lines
+            (a, b), gap = pair.members, gaps[k] * touching.unit
+            at = (float(lines.fractions(along.chosen(np.array([k])))[0]) for along in (found.one, found.other))
+            where = " and ".join(f"{x:.4g}" for x in at)
+            detail = f"members {a!r} and {b!r} penetrate by {-gap:.3g} m at {where} of their lengths"
             raise SceneError(f"{detail} at t = 0, accepted: members that do not", ("contacts", pair.contact))
         gaps = touching.on_obstacles(pose)
         for k in np.flatnonzero(gaps < -tolerances.CLOSED * self.system.model.scene.size / touching.unit).tolist():
