@@ -460,12 +460,20 @@ class Lines:
         points_within = (p for p in kept if all(p.sides) and self.has(p) and p.pair in lines)
         inner = [p for p in points_within if (p.pair, p.at[0]) not in ends and self._known_ends(mesh, every, p.pair)]
         # Where both ends of a stretch are known nothing says where between them a place slides.
-        sliding = [p for p in kept if p.pair in lines and self.ends_slide([p])]
-        known_ends = {(p.pair, p.at[0]) for p in sliding}
-        spans = [(key, own[0], own[-1]) for key, each in lines.items() for own in each]
-        closed = [(key, a, b) for key, a, b in spans if {(key, a), (key, b)} <= known_ends]
-        inner += [p for p in sliding if any(p.pair == key and a < p.at[0] < b for key, a, b in closed)]
+        for key, own in lines.items():
+            sliding = [p for p in kept if p.pair == key and self.ends_slide([p])]
+            for stretch in own:
+                first, last = (self._at(mesh, sliding, key, end) for end in (stretch[0], stretch[-1]))
+                between = (p for p in sliding if stretch[0] < p.at[0] < stretch[-1])
+                inner += [p for p in between if first and last and p not in (*first, *last)]
         return (*(p for p in kept if p not in inner), *new), len(new) + len(inner)
+
+    @staticmethod
+    def _at(mesh: Mesh, points: Iterable[ContactPoint], key: PairKey, end: float) -> list[ContactPoint]:
+        """Those of points of a line that are where it ends, or beside the end of elements that was made for that."""
+        e = mesh.element_at(key[1][0], end)
+        margin = AT_END * float(np.diff(mesh.cuts[key[1][0]])[e])
+        return [p for p in points if p.pair == key and abs(p.at[0] - end) <= margin]
 
     def _within(
         self, mesh: Mesh, points: Iterable[ContactPoint], key: PairKey, low: float, high: float
@@ -588,13 +596,13 @@ class Lines:
         fields, mesh = found.fields, found.model.mesh
         marks = {name: np.zeros(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
         pushes = {(p.pair, p.at[0]): fields.contact_point(p)["push"] for p in mesh.points}
-        scales, known = found.model.scales, {(p.pair, p.at[0]) for p in points_of(found) if self.ends_slide([p])}
+        scales, sliding = found.model.scales, [p for p in points_of(found) if self.ends_slide([p])]
         for key, stretches in self.stretches(found).items():
             first = key[1][0]
             lengths = np.diff(mesh.cuts[first]) * self.closest.lengths[first] / scales.length
             for stretch in stretches:
                 for at, inner in ((stretch[0], stretch[1:2]), (stretch[-1], stretch[-2:-1])):
-                    if not 0.0 < at < 1.0 or (key, at) in known:
+                    if not 0.0 < at < 1.0 or self._at(mesh, sliding, key, at):
                         continue
                     force = sum(pushes.get((key, x), 0.0) for x in {at, *inner}) / scales.force
                     cut = mesh.cut_at(first, at)

@@ -40,7 +40,7 @@ from .closest import Closest
 from .edges import Edges
 from .gripping import CENTRED, FIRM, Gripping, Placed
 from .lines import LINE, SHORT_LINE, Lines, Points, begun, ends_of, points_of
-from .pairs import ONE, Near, Pair, PairKey
+from .pairs import ONE, Near, Pair, PairKey, penetrating
 from .passing import Passing, tangents_turned
 
 __all__ = ["FITS", "LESS", "MORE", "MemberContact", "Way"]
@@ -238,10 +238,9 @@ class MemberContact:
         if not deep:
             return
         near = min(deep, key=lambda one: one.gap)
-        (a, b), (s, t) = near.members, near.at
-        found = f"members {a!r} and {b!r} penetrate" if a != b else f"member {a!r} penetrates itself"
-        where = f"at {s:.4g} and {t:.4g} of {'their lengths' if a != b else 'its length'}"
-        message = f"{found} by {-near.gap:.3g} m {where} in the undeformed scene, accepted: members that do not"
+        message = (
+            f"{penetrating(near.members, near.at, -near.gap)} in the undeformed scene, accepted: members that do not"
+        )
         raise SceneError(message, ("contacts", near.contact))
 
     def clear(self, fields: Fields) -> bool:
@@ -655,11 +654,11 @@ class MemberContact:
         """Whether members are inside of what they touched along lines of which nothing touches: these are none, then,
         as between ends of elements nothing would be seen.
         """
-        touching = {point.pair for point in found.model.mesh.points}
-        gone = self.lines.keys - touching
-        inside = bool(gone) and self.penetration(found.fields, [self.closest.pairs[key] for key in sorted(gone)])
-        self.lines.keys -= gone if inside > self.tolerance else set()
-        return inside > self.tolerance
+        gone = self.lines.keys - {point.pair for point in found.model.mesh.points}
+        if self.penetration(found.fields, [self.closest.pairs[key] for key in sorted(gone)]) <= self.tolerance:
+            return False
+        self.lines.keys -= gone
+        return True
 
     def _changed(self, found: Solved, tried: set[object], careful: bool, ended: bool) -> tuple[Points, int]:
         """The points to try next, where they are now, and how many are others than before; at most one if careful.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from ..description.obstacles import Obstacle
 from ..mathematics.arrays import Array
 
-__all__ = ["NEXT_TO", "ONE", "SAME", "Near", "Pair", "PairKey"]
+__all__ = ["NEXT_TO", "ONE", "SAME", "Near", "Pair", "PairKey", "penetrating"]
 
 SAME = 0.5
 """Minima nearer to each other than this part of the distance of the centre lines are one, along both members."""
@@ -119,3 +120,10 @@ class Pair:
             return None
         x, y, z = self.stop.normal.tolist()
         return x, y, z
+
+
+def penetrating(members: tuple[str, ...], at: Iterable[float], deep: float) -> str:
+    """``members 'a' and 'b' penetrate by 0.01 m at 0.5 and 0.2 of their lengths``: how deep, m, and where."""
+    (a, b), (s, t) = members, at
+    found = f"members {a!r} and {b!r} penetrate" if a != b else f"member {a!r} penetrates itself"
+    return f"{found} by {deep:.3g} m at {s:.4g} and {t:.4g} of {'their lengths' if a != b else 'its length'}"

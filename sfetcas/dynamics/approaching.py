@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..contact.closest import Closest
-from ..contact.pairs import Near, Pair
+from ..contact.pairs import Near, Pair, penetrating
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import TINY, Array, Index
 from ..mechanics.clearances import PARALLEL, Rows
@@ -186,8 +186,7 @@ class Approaching:
         """Refuse members that penetrate each other at the begin, or later where something has gone wrong."""
         if near.gap >= -DEEP * near.distance:
             return
-        (a, b), (s, t), seconds = near.members, near.at, memory.t * self._mover.time
-        detail = f"members {a!r} and {b!r} penetrate by {-near.gap:.3g} m at {s:.4g} and {t:.4g} of their lengths"
+        seconds, detail = memory.t * self._mover.time, penetrating(near.members, near.at, -near.gap)
         if memory.t == 0.0:
             raise SceneError(f"{detail} at t = 0, accepted: members that do not", ("contacts", near.contact))
         raise SolveError(Status.STOPPED, f"at {seconds:.9g} s {detail}", memory)

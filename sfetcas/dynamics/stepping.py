@@ -39,6 +39,7 @@ import numpy as np
 
 from .. import tolerances
 from ..contact.nearby import Places
+from ..contact.pairs import penetrating
 from ..errors import SceneError, SolveError, Status
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index, Sparse
@@ -578,10 +579,8 @@ class Stepping(Integrator):
         deep = gaps < -tolerances.CLOSED * self.system.model.scene.size / touching.unit
         for k in np.flatnonzero(deep).tolist():
             pair, lines = touching.nearby.pairs[found.pairs[k]], touching.nearby.lines
-            (a, b), gap = pair.members, gaps[k] * touching.unit
             at = (float(lines.fractions(along.chosen(np.array([k])))[0]) for along in (found.one, found.other))
-            where = " and ".join(f"{x:.4g}" for x in at)
-            detail = f"members {a!r} and {b!r} penetrate by {-gap:.3g} m at {where} of their lengths"
+            detail = penetrating(pair.members, at, -gaps[k] * touching.unit)
             raise SceneError(f"{detail} at t = 0, accepted: members that do not", ("contacts", pair.contact))
         gaps = touching.on_obstacles(pose)
         for k in np.flatnonzero(gaps < -tolerances.CLOSED * self.system.model.scene.size / touching.unit).tolist():

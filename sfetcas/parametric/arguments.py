@@ -21,7 +21,7 @@ from ..description.showing import made, named
 from ..description.supports import drives
 from ..errors import SceneError
 from ..mathematics.active import Active, gathered
-from ..mathematics.arrays import Array, numbers
+from ..mathematics.arrays import Array, numbers, unit
 from ..mathematics.constants import picked
 from ..mathematics.piecewise import piecewise
 from ..mechanics.beams import ELEMENT_DATA
@@ -283,7 +283,7 @@ def _along_guide(scene: Scene, motion: str) -> list[int]:
     node = None if moved.node is None else scene.nodes[moved.node]
     if node is None or not node.slides or node.direction is None or drives(node, moved.displacement):
         return []
-    return [i for i, share in enumerate(node.direction) if share]
+    return [i for i, share in enumerate(unit(node.direction)) if abs(share) > tolerances.DECIMAL]
 
 
 def _check_guide(scene: Scene, name: str) -> None:
