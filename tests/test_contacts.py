@@ -296,7 +296,8 @@ def test_wall_contact_is_symmetric(nodes):
     np.testing.assert_allclose(point.reaction("A")[0][1], point.reaction("B")[0][1], rtol=1e-9)
     (right, left), forces = stretch.contacts["upper"]["at"], stretch.contacts["upper"]["force"]
     np.testing.assert_allclose(left[0], 1.0 - right[1], atol=1e-9)
-    np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9)
+    # Along the wall there is rounding, or none.
+    np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(balance(stretch), 0.0, atol=1e-10)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sfetcas.mathematics import linear
-from sfetcas.mathematics.linear import SparseSolver
+from sfetcas.mathematics.linear import InertiaSolver, SparseSolver
 
 
 def frame(seed, n=240, rows=80):
@@ -59,9 +59,9 @@ def test_what_refinement_does_not_reach_is_solved_with_pivots(monkeypatch):
     solver, entries = solver_of(matrix, rows=80)
     solver.factor(entries)
     b = np.random.default_rng(1).normal(size=320)
-    soft = entries.copy()
-    soft[solver._diagonal] += solver._sides
-    _, error = solver._refined(solver._without_pivots, soft, b[:, None])
+    soft = solver._matrix.copy()
+    soft[solver._sparse.diagonal] += solver._sides
+    _, error = solver._refined(solver._sparse.without_pivots, soft, b[:, None])
     assert error > linear.SOLVED
     assert residual(matrix, solver.solve(b), b) < 1e-15
 
@@ -81,10 +81,41 @@ def test_singular_matrices_have_no_solution(rows, block):
     matrix = np.eye(200)
     matrix[:2, :2] = block
     solver, entries = solver_of(matrix, rows=rows, symmetric=False)
-    solver.factor(np.ones(200))
+    solver.factor(np.ones(len(entries)))
     solver.factor(entries)
     if block:
         with pytest.raises(np.linalg.LinAlgError, match="singular"):
             solver.solve(np.arange(200.0))
     else:
         assert not np.isfinite(solver.solve(np.arange(200.0))).all()
+
+
+@pytest.mark.parametrize("rows", [0, 80])
+def test_entries_that_were_zero_at_first_count_later(rows):
+    """What is zero is in no factors, as long as it is: of the first matrix the middle is diagonal, of the last too."""
+    matrix = frame(4) + 3.0 * np.eye(320)
+    solver, entries = solver_of(matrix, rows=rows, symmetric=bool(rows))
+    row, column = np.nonzero((matrix != 0.0).T | np.eye(len(matrix), dtype=bool))[::-1]
+    middle = (row != column) & (row > 20) & (row < 120)
+    apart = np.where(middle | middle[np.lexsort((column, row))], 0.0, entries)
+    b = np.random.default_rng(5).normal(size=320)
+    for given in (apart, entries, apart):
+        full = np.zeros(matrix.shape)
+        full[row, column] = given
+        solver.factor(given)
+        assert residual(full, solver.solve(b), b) < (1e-15 if rows else 1e-10)
+
+
+@pytest.mark.parametrize("soft", [1e-12, 1e-6])
+def test_negative_eigenvalues_are_counted_where_factors_miss_little(soft):
+    """Without pivots the factors of a matrix with nothing on its diagonal are worthless, and say so."""
+    matrix = frame(6)
+    matrix[np.diag_indices(320)] += np.repeat([soft, -soft], [240, 80])
+    row, column = np.nonzero((matrix != 0.0).T | np.eye(len(matrix), dtype=bool))[::-1]
+    solver = InertiaSolver(320, row, column)
+    solver.factor(matrix[row, column])
+    if soft > 1e-9:
+        assert solver.missed() < 1e-3
+        assert solver.negative() == (np.linalg.eigvalsh(matrix) < 0.0).sum() == 80
+    else:
+        assert not solver.missed() < 1.0

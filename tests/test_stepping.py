@@ -172,7 +172,8 @@ def test_bars_keep_momenta_and_lose_energy(kind, space, restitution, friction):
     assert motion.events
     for kind in ("linear", "angular"):
         values = np.array([step.momentum[kind] for step in motion.steps])
-        np.testing.assert_allclose(values, np.tile(values[0], (len(values), 1)), atol=1e-12)
+        # Newton's method ends one iteration after a change of 1e-8 at most, of which old factors leave a hundredth.
+        np.testing.assert_allclose(values, np.tile(values[0], (len(values), 1)), atol=1e-10)
     # Rounding of energies of 0.2 J.
     assert np.diff(motion.energies()).max() < 1e-13
     assert motion.energies()[-1] < 0.99 * motion.energies()[0]

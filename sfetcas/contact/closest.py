@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import tolerances
-from ..description.contacts import contact_radius, pairs_of
+from ..description.contacts import Contact, contact_radius, pairs_of
 from ..description.obstacles import edge_side, members_of, takes_part
 from ..description.scene import Scene
 from ..mathematics.arrays import TINY, Array
@@ -500,6 +500,10 @@ def answers(fields: Fields, error: float | None = None) -> dict[str, dict[str, A
         if not contact.between_members:
             lifted = min(LYING[1] if error is None else error, LIFTED) * scene.size
             entries = _stretches(fields, closest, points, entries, lifted)
+        for entry in entries:
+            entry["member"], entry["at"] = _first(scene, contact, entry["member"], entry["at"])
+            if contact.between_members:
+                entry["other"], entry["other_at"] = _first(scene, contact, entry["other"], entry["other_at"])
         found[name] = entries[0] if len(entries) == 1 else {key: [e[key] for e in entries] for key in entries[0]}
     return found
 
@@ -512,22 +516,20 @@ def _entry(fields: Fields, point: ContactPoint) -> dict[str, Any]:
     entry |= {"friction": told["friction"], "sticking": told["sticks"]} if point.grip is not None else {}
     if len(places) == 2:
         gap = float(np.linalg.norm(places[0] - places[1])) - point.distance
-        one, other = (_first(fields.model.scene, point, m, x) for m, x in zip(point.members, told["at"], strict=True))
-        named = {"member": one[0], "at": one[1], "other": other[0], "other_at": other[1]}
-        return {**entry, **named, "gap": gap}
+        return {**entry, "other": point.members[1], "other_at": told["at"][1], "gap": gap}
     stop = fields.model.scene.obstacles[point.contact]
     seen = fields.seen(point.contact, places[0][None], fields.tangents(point.members[0], np.array(told["at"])))
     gap = stop.gaps(*seen, way=point.edge or 1.0)[0]
     return {**entry, "gap": float(gap) - fields.model.scene.contacts[point.contact].member_radius}
 
 
-def _first(scene: Scene, point: ContactPoint, member: str, x: float) -> tuple[str, float]:
-    """A place of a member of a point; at a node that of the first member of the contact that ends there."""
-    if x not in (0.0, 1.0):
+def _first(scene: Scene, contact: Contact, member: str, x: Any) -> tuple[str, Any]:
+    """A place of a member; at a node that of the first member of a contact that ends there, stretches as they are."""
+    if isinstance(x, list) or x not in (0.0, 1.0):
         return member, x
-    node, taking = scene.members[member].nodes[int(x)], members_of(scene.contacts[point.contact], scene.members)
-    ends = ((name, scene.members[name].nodes) for name in scene.members if name in taking)
-    name, nodes = next((name, nodes) for name, nodes in ends if node in nodes and scene.members[name].type != "small")
+    node, taking = scene.members[member].nodes[int(x)], members_of(contact, scene.members)
+    ends = ((name, one.nodes) for name, one in scene.members.items() if name in taking and one.type != "small")
+    name, nodes = next((name, nodes) for name, nodes in ends if node in nodes)
     return name, float(nodes.index(node))
 
 

@@ -208,8 +208,10 @@ class Lines:
                 found = self.element_of(mesh, point)
                 no = found is not None and found[1] in taken[pair]
             else:
-                no = self.chosen(pair) and bool(self._known_ends(mesh, points, pair))
-                no |= point.at[0] in (0.0, 1.0) and self._node(point) in self._nodes(points, pair)
+                # At its end a member may be pressed at a point wherever it lies beyond that.
+                at_node = point.at[0] in (0.0, 1.0)
+                no = self.chosen(pair) and not at_node and bool(self._known_ends(mesh, points, pair))
+                no |= at_node and self._node(point) in self._nodes(points, pair)
             allowed += [] if no else [point]
         return allowed
 

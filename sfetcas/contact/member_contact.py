@@ -734,7 +734,7 @@ class MemberContact:
         kept: list[ContactPoint] = []
         for i in np.argsort(-pushes, kind="stable").tolist():
             point = points[i]
-            if self.lines.has(point) or not any(self._same(point, other) for other in kept):
+            if self.lines.has(point) or not any(self._same(point, one) for one in kept if not self.lines.has(one)):
                 kept.append(point)
         return [point for point in points if point in kept]
 

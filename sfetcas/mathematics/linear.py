@@ -84,6 +84,42 @@ FULL = 20_000
 """Up to this many places the product with the full matrix is faster (measured)."""
 
 
+class Filled:
+    """The places of matrices of one pattern at which there has been an entry, and the diagonal.
+
+    Of what terms may give most can be zero, as of elements beyond a place: it would be in all factors.
+
+    Parameters
+    ----------
+    row, column : ndarray
+        Positions of the entries, column by column.
+    symmetric : bool
+        Whether an entry stands for that across the diagonal, too.
+
+    Attributes
+    ----------
+    row, column : ndarray
+        The places, column by column.
+    grown : bool
+        Whether the last matrix has entries elsewhere than those before, or was the first.
+    """
+
+    def __init__(self, row: Array, column: Array, *, symmetric: bool = True) -> None:
+        self._row, self._column, self._known = row, column, np.zeros(len(row), bool)
+        # Rounding may leave a zero on one side of the diagonal alone.
+        self._across = np.lexsort((column, row)) if symmetric else np.arange(len(row))
+
+    def taken(self, entries: Array) -> Array:
+        """Of the entries of a matrix those at the places."""
+        filled = entries != 0.0
+        filled |= filled[self._across]
+        self.grown = bool((filled & ~self._known).any()) or not self._known.any()
+        if self.grown:
+            self._known |= filled | (self._row == self._column)
+            self.row, self.column = self._row[self._known], self._column[self._known]
+        return entries[self._known]
+
+
 class SparseSolver:
     """Solutions of ``A x = b`` for matrices of one pattern.
 
@@ -110,14 +146,17 @@ class SparseSolver:
         self._small, self._few, self._symmetric = n <= DENSE, rows <= FEW_ROWS, symmetric
         self._rows, self._lost = rows, 0
         self._sides = np.repeat([tolerances.SOFT, -tolerances.SOFT], [n - rows, rows])
+        self._filled = Filled(row, column, symmetric=symmetric)
 
     def factor(self, entries: Array) -> None:
         """Set the entries of the matrix; it is factorised by the next :meth:`solve`."""
         if self._small:
             self._matrix: Array = np.zeros((self.n, self.n))
             self._matrix[self._row, self._column] = entries
-        else:
-            self._matrix = entries
+            return
+        self._matrix = self._filled.taken(entries)
+        if self._filled.grown:
+            self._sparse = _Sparse(self.n, self._filled.row, self._filled.column, self._rows)
 
     def solve(self, b: Array) -> Array:
         """Solution for the matrix set last and right sides b, (n,) or (n, k); not finite for large singular matrices.
@@ -129,17 +168,17 @@ class SparseSolver:
         """
         if self._small:
             return np.asarray(np.linalg.solve(self._matrix, b))
-        columns = b.reshape(self.n, -1)
+        columns, sparse = b.reshape(self.n, -1), self._sparse
         if self._few:
-            return self._rows_last.solve(self._matrix, columns).reshape(b.shape)
+            return sparse.rows_last.solve(self._matrix, columns).reshape(b.shape)
         x, error = np.full(columns.shape, np.nan), np.inf
         if self._symmetric and self._lost < OFTEN:
             soft = self._matrix.copy()
-            soft[self._diagonal] += self._sides
-            x, error = self._refined(self._without_pivots, soft, columns)
+            soft[sparse.diagonal] += self._sides
+            x, error = self._refined(sparse.without_pivots, soft, columns)
             self._lost = 0 if error <= SOLVED else self._lost + 1
         if not error <= SOLVED:
-            other, least = self._refined(self._with_pivots, self._matrix, columns)
+            other, least = self._refined(sparse.with_pivots, self._matrix, columns)
             x = other if not error <= least else x
         return x.reshape(b.shape)
 
@@ -152,7 +191,7 @@ class SparseSolver:
             x = x + factors.solve(near, left)
             if not np.isfinite(x).all():
                 break
-            left = b - self._times(x)
+            left = b - self._sparse.product(self._matrix, x)
             error = float((np.abs(left).max(axis=0) / (size * np.abs(x).max(axis=0) + most + TINY)).max())
             if not error < last:
                 break
@@ -161,28 +200,29 @@ class SparseSolver:
                 break
         return best, last
 
-    def _times(self, x: Array) -> Array:
-        return self._product(self._matrix, x)
+
+class _Sparse:
+    """A pattern of a :class:`SparseSolver`: where the diagonal is, products, and factors."""
+
+    def __init__(self, n: int, row: Array, column: Array, rows: int) -> None:
+        self._n, self._row, self._column, self._rows = n, row, column, rows
+        self.diagonal = np.flatnonzero(row == column)
 
     @functools.cached_property
-    def _product(self) -> Product:
-        return Product(pattern(self.n, self._row, self._column))
+    def product(self) -> Product:
+        return Product(pattern(self._n, self._row, self._column))
 
     @functools.cached_property
-    def _diagonal(self) -> Array:
-        return np.flatnonzero(self._row == self._column)
+    def without_pivots(self) -> _Factors:
+        return _Factors("ldl", self._n, self._row, self._column)
 
     @functools.cached_property
-    def _without_pivots(self) -> _Factors:
-        return _Factors("ldl", self.n, self._row, self._column)
+    def with_pivots(self) -> _Factors:
+        return _Factors("csparse", self._n, self._row, self._column)
 
     @functools.cached_property
-    def _with_pivots(self) -> _Factors:
-        return _Factors("csparse", self.n, self._row, self._column)
-
-    @functools.cached_property
-    def _rows_last(self) -> _Factors:
-        return _Factors("csparse", self.n, self._row, self._column, self._rows)
+    def rows_last(self) -> _Factors:
+        return _Factors("csparse", self._n, self._row, self._column, self._rows)
 
 
 def _unsaid() -> contextlib.redirect_stderr[io.StringIO]:
@@ -322,28 +362,55 @@ class InertiaSolver:
     """Factors that count negative eigenvalues of symmetric matrices of one pattern.
 
     All methods raise numpy.linalg.LinAlgError where the factorisation breaks down.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrix.
+    row, column : ndarray
+        Positions of the entries, column by column, with the whole diagonal.
     """
 
-    def __init__(self, name: str, sparsity: ca.Sparsity) -> None:
-        self._solver = ca.Linsol(name, "ldl", sparsity)
-        self._solver.sfact(ca.DM(sparsity, 1.0))
+    def __init__(self, n: int, row: Array, column: Array) -> None:
+        self._n, self._filled = n, Filled(row, column)
 
-    def nfact(self, matrix: ca.DM) -> None:
-        """Factorise a matrix; LinAlgError where that breaks down."""
+    def factor(self, entries: Array) -> None:
+        """Factorise the matrix with these entries."""
+        taken = self._filled.taken(entries)
+        if self._filled.grown:
+            self._sparsity = pattern(self._n, self._filled.row, self._filled.column)
+            self._solver = ca.Linsol("inertia", "ldl", self._sparsity)
+            self._solver.sfact(ca.DM(self._sparsity, 1.0))
+        self._matrix = ca.DM(self._sparsity, taken)
         try:
             with _unsaid():
-                self._solver.nfact(matrix)
+                self._solver.nfact(self._matrix)
         except RuntimeError:
             raise np.linalg.LinAlgError("no factors without pivots") from None
 
-    def neig(self, matrix: ca.DM) -> int:
+    def negative(self) -> int:
         """Number of negative eigenvalues of the matrix that was factorised last."""
-        return int(self._solver.neig(matrix))
+        return int(self._solver.neig(self._matrix))
 
-    def solve(self, matrix: ca.DM, b: ca.DM) -> ca.DM:
-        """Solution for the matrix that was factorised last; LinAlgError where that is singular."""
+    def solve(self, b: Array) -> Array:
+        """Solution (n, k) for the matrix that was factorised last."""
         try:
             with _unsaid():
-                return self._solver.solve(matrix, b)
+                return np.asarray(self._solver.solve(self._matrix, ca.DM(b)).full())
         except RuntimeError:
             raise np.linalg.LinAlgError("no factors without pivots") from None
+
+    def missed(self) -> float:
+        """What the factors miss of the matrix over the matrix, as refinement shows it: below 1 they count right.
+
+        Not finite where nothing is left of them.
+        """
+        left, sizes = np.ones((self._n, 1)), [np.inf]
+        for _ in range(MISSES):
+            left = left - ca.mtimes(self._matrix, ca.DM(self.solve(left))).full()
+            sizes.append(float(np.linalg.norm(left)))
+        return 0.0 if sizes[-1] <= BLURRED * np.sqrt(self._n) else sizes[-1] / max(sizes[-2], TINY)
+
+
+MISSES, BLURRED = 3, 1e-8
+"""Rounds after which what is left falls by the largest share that it can; share of the first that can be rounding."""

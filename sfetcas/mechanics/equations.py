@@ -120,6 +120,8 @@ class Equations:
         self.model = model
         # Whether rows depend on each other where Newton's method began; looked for when it does.
         self.redundant: bool | None = None
+        # The last entries of the matrix for which that was asked, how exactly, and what was found.
+        self.loose: tuple[Array, float, Array] | None = None
         self.tables = tables = Tables(model)
         self.number, self.place_number = tables.number, tables.place_number
         self.rotation_unknowns, self.displacement_unknowns = tables.rotation_unknowns, tables.displacement_unknowns

@@ -39,6 +39,13 @@ def loose_rows(equations: Equations, point: Point, slack: float | None = None) -
     slack = SLACK if slack is None else slack
     if not equations.rows:
         return np.zeros((0, 0))
+    # A step and what is left after it ask for the same.
+    if equations.loose is None or equations.loose[0] is not point.entries or equations.loose[1] != slack:
+        equations.loose = (point.entries, slack, _loose_rows(equations, point, slack))
+    return equations.loose[2]
+
+
+def _loose_rows(equations: Equations, point: Point, slack: float) -> Array:
     # A usual size of rows, so that a row without derivative is found also if it is the only one.
     # Without beams rows are of the size of one.
     usual = float((equations.model.beams.weight**2).sum()) or 1.0
