@@ -161,6 +161,26 @@ def test_free_then_a_place_then_a_stretch(heavy):
         assert ours.position("tip") == pytest.approx(theirs.position("tip"), abs=2e-6)
 
 
+def test_a_leaf_winds_round_a_stop_from_its_clamp_on():
+    """At a clamp that is tangential to a drum nothing can push: it lies on that from where it is as curved as that."""
+    found = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {"root": {"position": [0, 0], "support": "clamped"}, "tip": {"position": [1, 0]}},
+        "members": {"leaf": {"nodes": ["root", "tip"], "section": "s"}},
+        "loads": {"F": {"type": "force", "node": "tip", "value": [0, -1]}},
+        "contacts": {"drum": {"type": "circle", "center": [0, -5], "radius": 5, "member": "leaf"}},
+        "analysis": {"type": "path", "range": [0, 0.4], "steps": [0.4], "accuracy": 1e-4},
+    }
+    path = solve(Scene.from_dict(found))
+    (begins,) = path.transitions
+    assert begins.changes == ("leaf begins to lie along contacts.drum",)
+    # Its curvature there is that of the drum but for 1e-6, below which it begins to lie; it is the force times its arm.
+    assert begins.factor * begins.position("tip")[0] == pytest.approx(0.2, abs=1.5e-6)
+    end = path.steps[0].contacts["drum"]["at"][1]
+    arm = path.steps[0].position("tip")[0] - 5.0 * np.sin(end / 5.0)
+    assert 0.4 * arm == pytest.approx(0.2, rel=1e-5)
+
+
 def test_a_stretch_becomes_a_place_and_lifts_off():
     """A heavy cantilever whose clamp is raised from near the floor: it lies, then touches with its tip, then hangs."""
     found = table("floor_heavy_cantilever", type="path", range=[0, 0.8], accuracy=1e-6)

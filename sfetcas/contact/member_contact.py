@@ -437,8 +437,7 @@ class MemberContact:
                 return curve.corrected(state, source.factor, along)
             limits: dict[str, Any] = {"iterations": ITERATIONS, "most": TURN, "slides": SLIDES, "contraction": 2.0}
             found = prepared.correct(state, loading, drag=resisting, **limits)
-        good = found.converged or found.residual <= tolerances.BALANCED
-        return found if good else None
+        return found if found.balanced else None
 
     def _added(self, prepared: Prepared, since: Solved | None, drag: float) -> Callable[[State, Point], Point] | None:
         """What the equations have beside those of the model: drag, and gaps of surfaces that are drawn back."""

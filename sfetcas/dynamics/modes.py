@@ -513,7 +513,7 @@ def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None, kept: Kept | None
     elif rest is not None:
         state = carried(prepared.equations, transferred(rest.model, rest.state, prepared.model), loading)
     found = prepared.correct(state, loading, iterations=30)
-    if not found.converged and not found.residual <= tolerances.BALANCED:
+    if not found.balanced:
         detail = f"the equilibrium is none on the mesh of its masses: Newton's method left {found.residual:.1e}"
         raise SolveError(Status.FAILED, detail, state)
     return found

@@ -17,6 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from .. import tolerances
 from ..contact.lines import LINE, lies_along, points_in, points_of
 from ..contact.member_contact import MemberContact
 from ..contact.pairs import ONE, Near
@@ -256,6 +257,7 @@ class Touching(Conditions[_At]):
             gap = self.reach if one is None else one.gap
             found.append((_Touch(*key, (), False) if one is None else _touch(one), gap / scales.length))
         found += [(one, gap / scales.length) for one, gap in self._held(fields)]
+        found += list(self._clamped(fields))
         for point, begun in zip(points, fields.model.mesh.points, strict=True):
             push = fields.contact_point(begun)["push"]
             found.append((_Touch(*point.pair, point.at, True), push / scales.force - LEFT))
@@ -400,6 +402,18 @@ class Touching(Conditions[_At]):
                     seen = fields.seen(pair.contact, fields.positions(member, x), fields.tangents(member, x))
                     yield _Driven(*pair.key, (float(end),)), float(pair.stop.gaps(*seen)[0]) - radius
 
+    def _clamped(self, fields: Fields) -> Iterator[tuple[_Flat, float]]:
+        """Ends of members that no obstacle can push, and how much the members bend away from where they are on one."""
+        on = {point.pair for point in fields.model.mesh.points}
+        for key, pair in self.closest.pairs.items():
+            if pair.stop is None or pair.edge or not self.run.lines.bends(pair.members[0]):
+                continue
+            for end in (float(end) for end, free in enumerate(pair.ends) if not free):
+                apart = self.closest.gap_at(fields, key, end) > tolerances.CLOSED * self.scene.size
+                apart = apart or abs(float(self.closest.slopes(fields, key, (end,))[0])) > NEAR
+                one = _Flat(*key, (end,))
+                yield one, OPEN if apart or key in on else self._bend(fields, one) - STRAIGHT
+
     def _bend(self, fields: Fields, one: _At | ContactPoint) -> float:
         """Least curvature of the gap along what a place slides on, or begins to slide on, dimensionless."""
         if self.closest.pairs[one.pair].edge:
@@ -471,6 +485,10 @@ class Touching(Conditions[_At]):
         """As of :class:`.Conditions`: the gap is not curved there."""
         points = points_in(fields)
         points += tuple(self._new(one) for one in near if isinstance(one, _Touch) and one.at and not one.active)
+        clamped = [one for one, bend in self._clamped(fields) if bend <= NEAR]
+        points += tuple(
+            ContactPoint(*one.pair, one.at, (False,), self.closest.pairs[one.pair].distance) for one in clamped
+        )
         return [point for point in points if len(point.members) == 1 and self._is_flat(fields, point, points)]
 
     def _is_flat(self, fields: Fields, point: ContactPoint, points: Sequence[ContactPoint]) -> bool:

@@ -259,7 +259,7 @@ class Prepared:
             # Along a long flat valley steps in quaternions are short; increments of rotations allow long ones.
             polished = self.downhill(trial, loading) or polished
         # A structure that falls without end has residual nan, for which every comparison is false: hence the "not".
-        if not polished.converged and not polished.residual <= tolerances.BALANCED:
+        if not polished.balanced:
             slid = problem.slid_off(result.x)
             if slid:
                 raise SolveError(Status.SLID, slid, trial)
@@ -445,6 +445,11 @@ class Solved:
     def taken(cls, prepared: Prepared, state: State, loading: Loading) -> Solved:
         """A state that is taken for an equilibrium, without looking whether it is one."""
         return cls(prepared, state, loading, prepared.equations.at(state, loading), 0.0)
+
+    @property
+    def balanced(self) -> bool:
+        """Whether it is an equilibrium: Newton's method has converged, or came as near as answers need."""
+        return self.converged or self.residual <= tolerances.BALANCED
 
     @property
     def equations(self) -> Equations:
