@@ -1134,3 +1134,38 @@ def test_what_is_soft_bends_at_the_begin_without_a_jump():
     held = step.contacts["water"]["force"] if step.contacts["water"]["at"] is not None else np.zeros(3)
     up = sum(step.reaction(node)[0][1] for node in ("butt", "reel")) + np.sum(np.atleast_2d(held), axis=0)[1]
     assert up == pytest.approx(10.0, abs=1e-6)
+
+
+# -- what turns far in a step ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("force", [2.0, 20.0])
+@pytest.mark.parametrize("kind", ["plane", "peg", "member"])
+def test_a_tip_that_turns_does_not_pass_what_is_in_its_way(kind, force):
+    """Something reaches into the circle of the tip of a bar on a hinge, which is clear of it before and after."""
+    out, deep, radius = np.array([np.cos(0.46), np.sin(0.46)]), 0.01, 0.05
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+        "members": {"bar": {"nodes": ["A", "B"], "section": "s", "type": "rigid"}},
+        "springs": {"k": {"type": "rotational", "node": "A", "stiffness": 1.0}},
+        "loads": {"F": {"type": "force", "node": "B", "value": [-0.5 * force, force]}},
+    }
+    # Half the angle between the two places at which the tip touches, by the cosine rule.
+    far = 1.0 - deep
+    if kind == "plane":
+        shape = {"type": "plane", "point": (far * out).tolist(), "normal": (-out).tolist(), "members": "all"}
+        angle = np.arccos(far)
+    elif kind == "peg":
+        far = 1.0 + radius - deep
+        shape = {"type": "circle", "center": (far * out).tolist(), "radius": radius, "members": "all"}
+        angle = np.arccos((1.0 + far**2 - radius**2) / (2.0 * far))
+    else:
+        far = 1.0 + 2.0 * radius - deep
+        nodes = {"C": {"position": (far * out).tolist(), "support": "clamped"}, "D": {"position": (1.2 * out).tolist()}}
+        table["nodes"] |= nodes
+        table["members"]["other"] = {"nodes": ["C", "D"], "section": "s", "type": "rigid"}
+        shape = {"type": "members", "members": ["bar", "other"], "radius": radius}
+        angle = np.arccos((1.0 + far**2 - 4.0 * radius**2) / (2.0 * far))
+    x, y, _ = solve(made({**table, "contacts": {"stop": shape}})).last.position("B")
+    assert math.atan2(y, x) == pytest.approx(0.46 - angle, abs=1e-9)

@@ -257,7 +257,8 @@ class MemberContact:
         """Whether members neither penetrate nor pass each other from one state to another."""
         self.edges.begin(before.fields)
         near = self._swung(before, after) < STRIDE and self.clear(after.fields)
-        return near and not self.passing.passed(before.fields, after.fields)
+        fields = before.fields, after.fields
+        return near and not (self.passing.passed(*fields) or self.passing.bulged(*fields))
 
     @staticmethod
     def _swung(before: Solved, after: Solved) -> float:
@@ -851,6 +852,7 @@ class MemberContact:
                 if step >= SHORTEST:
                     self.lines.keys = lines
                     continue
+            aside = there is not None and self.passing.bulged(now.solved.fields, there.fields)
             finer = None if there is None else self._refined(there, way(part))
             # In the shortest steps what no finer mesh has goes on as it is: the answer is refined all the same.
             there = there if finer is None and step <= narrow else finer
@@ -859,7 +861,7 @@ class MemberContact:
             falling = there is not None and self.unstable(there, way(part))
             # What turns so much faster than before may have gone over to another branch.
             sudden = turned > max(TOLD, SUDDEN * pace * (part - now.part)) and pace > 0.0
-            aside = there is not None and self.passing.aside(now.solved.fields, there.fields)
+            aside |= there is not None and self.passing.aside(now.solved.fields, there.fields)
             if there is None or ((falling or sudden or aside) and step > narrow):
                 unstable = _Step(part, there) if there is not None and falling else unstable
                 # What was taken for a line on the way to a state that is not taken is none.

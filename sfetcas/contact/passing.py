@@ -8,18 +8,25 @@ Where members pass edges is a question of its own, see :mod:`~sfetcas.contact.ed
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
+from dataclasses import replace
+
 import numpy as np
 
+from ..description.obstacles import Obstacle
 from ..description.scene import Scene
-from ..mathematics.arrays import TINY
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.fields import Fields
 from .closest import Closest
 from .edges import Edges
 from .gripping import Placed
 from .lines import points_in
-from .pairs import Near
+from .pairs import Near, Pair, PairKey
 
 __all__ = ["ROUND", "Passing", "tangents_turned"]
+
+SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Where on the way between two states it is looked: also near to its ends, as at one of them it may touch."""
 
 ROUND = 0.5
 """Angle round an obstacle by which what begins to touch it may be from where it was, rad."""
@@ -69,20 +76,63 @@ class Passing:
         """Whether places of members that move straight from one state to another come inside of a round obstacle that
         these touch in neither.
         """
-        touched = {point.pair for fields in (before, after) for point in fields.model.mesh.points}
-        for pair in self.closest.pairs.values():
-            stop = pair.stop
-            if stop is None or pair.edge or not pair.passable or pair.key in touched:
+        one, other = ({point.pair for point in fields.model.mesh.points} for fields in (before, after))
+        for pair, stop, a, b in self._moves(before, after, one | other):
+            if not pair.passable:
                 continue
-            x = self.closest.samples(after.model.mesh, pair.members[0])
-            places = (f.positions(pair.members[0], x) for f in (before, after))
-            a, b = (f.seen(pair.contact, p, p)[0] for f, p in zip((before, after), places, strict=True))
             first, way = (a - stop.place) @ stop.across, (b - a) @ stop.across
             size = np.maximum(np.einsum("ni,ni->n", way, way), TINY)
             share = np.clip(-np.einsum("ni,ni->n", first, way) / size, 0.0, 1.0)
             if (np.linalg.norm(first + share[:, None] * way, axis=1) < pair.distance - self.tolerance).any():
                 return True
         return False
+
+    def bulged(self, before: Fields, after: Fields) -> bool:
+        """Whether places of members that turn may have been inside of what these touch in one state at most: they move
+        on arcs, of which the middle is an eighth of their length times the angle aside of the straight way.
+        """
+        middle = 0.125 * tangents_turned(before, after)
+        one, other = ({point.pair for point in fields.model.mesh.points} for fields in (before, after))
+        for pair, stop, a, b in self._moves(before, after, one & other):
+            far = np.linalg.norm(b - a, axis=1)
+            for share in SHARES:
+                here = a + share * (b - a)
+                apart = np.einsum("ni,ni->n", (here - stop.place) @ stop.across, stop.normals(here, here))
+                aside = 4.0 * share * (1.0 - share) * middle * far
+                if (apart - pair.distance < aside - self.tolerance).any():
+                    return True
+        return self._bulged_between(before, after, middle, one & other)
+
+    def _bulged_between(self, before: Fields, after: Fields, middle: float, known: Collection[PairKey]) -> bool:
+        """As :meth:`bulged` between members on the same elements, none of ``known`` pairs."""
+        keys = {key for key, pair in self.closest.pairs.items() if pair.stop is None} - {*known}
+        if not keys or not before.model.mesh.same(replace(after.model.mesh, points=before.model.mesh.points)):
+            return False
+        moved = (
+            np.linalg.norm(after.positions(name, x) - before.positions(name, x), axis=1).max()
+            for name in {name for key in keys for name in key[1]}
+            for x in [self.closest.samples(after.model.mesh, name)]
+        )
+        reach = 2.0 * middle * float(max(moved))
+        if reach <= self.tolerance:
+            return False
+        for share in SHARES:
+            for near, far in self.closest.between(before, after, share, reach):
+                if near.pair in keys and near.gap < 4.0 * share * (1.0 - share) * middle * far - self.tolerance:
+                    return True
+        return False
+
+    def _moves(
+        self, before: Fields, after: Fields, known: Collection[PairKey]
+    ) -> Iterator[tuple[Pair, Obstacle, Array, Array]]:
+        """Of members and obstacles that are no ``known`` pairs places (n, 3) in both states, as obstacles see them."""
+        for pair in self.closest.pairs.values():
+            if pair.stop is None or pair.edge or pair.key in known:
+                continue
+            x = self.closest.samples(after.model.mesh, pair.members[0])
+            places = (f.positions(pair.members[0], x) for f in (before, after))
+            a, b = (f.seen(pair.contact, p, p)[0] for f, p in zip((before, after), places, strict=True))
+            yield pair, pair.stop, a, b
 
     def aside(self, before: Fields, after: Fields) -> bool:
         """Whether what begins to touch a round obstacle does so far round it from where it was: it may have gone deep

@@ -57,9 +57,10 @@ class Curve:
     starts: Array
     tangents: Array
 
-    def mean(self, other: Curve) -> Curve:
-        """What gives the exact derivatives between two states."""
-        return Curve(0.5 * (self.starts + other.starts), 0.5 * (self.tangents + other.tangents))
+    def mean(self, other: Curve, share: float = 0.5) -> Curve:
+        """What is a share of the straight way from here to another state; the middle gives the exact derivatives."""
+        first = 1.0 - share
+        return Curve(first * self.starts + share * other.starts, first * self.tangents + share * other.tangents)
 
 
 class Lines:
