@@ -208,12 +208,19 @@ class Lines:
                 found = self.element_of(mesh, point)
                 no = found is not None and found[1] in taken[pair]
             else:
-                # At its end a member may be pressed at a point wherever it lies beyond that.
                 at_node = point.at[0] in (0.0, 1.0)
-                no = self.chosen(pair) and not at_node and bool(self._known_ends(mesh, points, pair))
+                # At a node from which a member rises it may be pressed, wherever it lies beyond that.
+                no = self.chosen(pair) and bool(self._known_ends(mesh, points, pair))
+                no &= not at_node or self._lies_beside(mesh, points, pair, point.at[0])
                 no |= at_node and self._node(point) in self._nodes(points, pair)
             allowed += [] if no else [point]
         return allowed
+
+    @staticmethod
+    def _lies_beside(mesh: Mesh, points: Iterable[ContactPoint], key: PairKey, end: float) -> bool:
+        """Whether points of a line are on the element beside an end of its member, beyond that."""
+        x = mesh.cuts[key[1][0]][1 if end == 0.0 else -2]
+        return any(p.pair == key and p.at[0] != end and abs(p.at[0] - end) <= abs(x - end) for p in points)
 
     @staticmethod
     def element_of(mesh: Mesh, point: ContactPoint) -> tuple[PairKey, int] | None:

@@ -101,23 +101,33 @@ class Filled:
     row, column : ndarray
         The places, column by column.
     grown : bool
-        Whether the last matrix has entries elsewhere than those before, or was the first.
+        Whether the last matrix has entries elsewhere than those before.
     """
 
     def __init__(self, row: Array, column: Array, *, symmetric: bool = True) -> None:
-        self._row, self._column, self._known = row, column, np.zeros(len(row), bool)
-        # Rounding may leave a zero on one side of the diagonal alone.
-        self._across = np.lexsort((column, row)) if symmetric else np.arange(len(row))
+        self.row, self.column, self._row, self._column = row, column, row, column
+        # Where there are few, looking for zeros costs more than they do.
+        self._every, self._known, self.grown = len(row) <= FEW_ENTRIES, row == column, False
+        if not self._every:
+            self.row, self.column = row[self._known], column[self._known]
+            # Rounding may leave a zero on one side of the diagonal alone.
+            self._across = np.lexsort((column, row)) if symmetric else np.arange(len(row))
 
     def taken(self, entries: Array) -> Array:
         """Of the entries of a matrix those at the places."""
+        if self._every:
+            return entries
         filled = entries != 0.0
         filled |= filled[self._across]
-        self.grown = bool((filled & ~self._known).any()) or not self._known.any()
+        self.grown = bool((filled & ~self._known).any())
         if self.grown:
-            self._known |= filled | (self._row == self._column)
+            self._known |= filled
             self.row, self.column = self._row[self._known], self._column[self._known]
         return entries[self._known]
+
+
+FEW_ENTRIES = 50_000
+"""Up to so many entries factors with all of them take a millisecond."""
 
 
 class SparseSolver:
@@ -156,7 +166,11 @@ class SparseSolver:
             return
         self._matrix = self._filled.taken(entries)
         if self._filled.grown:
-            self._sparse = _Sparse(self.n, self._filled.row, self._filled.column, self._rows)
+            self.__dict__.pop("_sparse", None)
+
+    @functools.cached_property
+    def _sparse(self) -> _Sparse:
+        return _Sparse(self.n, self._filled.row, self._filled.column, self._rows)
 
     def solve(self, b: Array) -> Array:
         """Solution for the matrix set last and right sides b, (n,) or (n, k); not finite for large singular matrices.
@@ -377,16 +391,24 @@ class InertiaSolver:
     def factor(self, entries: Array) -> None:
         """Factorise the matrix with these entries."""
         taken = self._filled.taken(entries)
-        if self._filled.grown:
-            self._sparsity = pattern(self._n, self._filled.row, self._filled.column)
-            self._solver = ca.Linsol("inertia", "ldl", self._sparsity)
-            self._solver.sfact(ca.DM(self._sparsity, 1.0))
+        for name in ("_solver", "_sparsity") if self._filled.grown else ():
+            self.__dict__.pop(name, None)
         self._matrix = ca.DM(self._sparsity, taken)
         try:
             with _unsaid():
                 self._solver.nfact(self._matrix)
         except RuntimeError:
             raise np.linalg.LinAlgError("no factors without pivots") from None
+
+    @functools.cached_property
+    def _sparsity(self) -> ca.Sparsity:
+        return pattern(self._n, self._filled.row, self._filled.column)
+
+    @functools.cached_property
+    def _solver(self) -> ca.Linsol:
+        solver = ca.Linsol("inertia", "ldl", self._sparsity)
+        solver.sfact(ca.DM(self._sparsity, 1.0))
+        return solver
 
     def negative(self) -> int:
         """Number of negative eigenvalues of the matrix that was factorised last."""
