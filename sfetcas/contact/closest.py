@@ -154,17 +154,12 @@ class Closest:
             near += self._once_each(one for one in self._told(nearby, curve, found) if one.pair in keys)
         return near
 
-    def between(self, before: Fields, after: Fields, share: float, reach: float) -> list[tuple[Near, float]]:
-        """Minima of the distance between members on the straight way between two states, and how far their places have
-        moved against each other, m.
+    def on_way(self, before: Fields, after: Fields, share: float, reach: float) -> list[Near]:
+        """Minima of the distance between members, of surfaces nearer to each other than ``reach``, m, at a share of the
+        straight way between two states on the same elements.
         """
-        nearby, ends = self.nearby(after.model), [self.nearby(f.model).lines.of(f) for f in (before, after)]
-        curve = ends[0].mean(ends[1], share)
-        found = nearby.found(curve, reach / after.model.scales.length, ends=False)
-        first, last = (nearby.between(end, found) for end in ends)
-        order = np.lexsort((np.linalg.norm(nearby.between(curve, found), axis=1), found.pairs))
-        far = nearby.lines.unit * np.linalg.norm(last - first, axis=1)[order]
-        return list(zip(self._told(nearby, curve, found), far.tolist(), strict=True))
+        nearby, curve = self.nearby(after.model), self._curve(before).mean(self._curve(after), share)
+        return self._told(nearby, curve, nearby.found(curve, reach / after.model.scales.length, ends=False))
 
     def nearby(self, model: Model, tables: Tables | None = None) -> Nearby:
         """The search among the members of a model, coarse where the ``tables`` of a motion are given."""

@@ -220,7 +220,8 @@ class Lines:
     def _lies_beside(mesh: Mesh, points: Iterable[ContactPoint], key: PairKey, end: float) -> bool:
         """Whether points of a line are on the element beside an end of its member, beyond that."""
         x = mesh.cuts[key[1][0]][1 if end == 0.0 else -2]
-        return any(p.pair == key and p.at[0] != end and abs(p.at[0] - end) <= abs(x - end) for p in points)
+        reach = abs(x - end) + SAME_CUT
+        return any(p.pair == key and p.at[0] != end and abs(p.at[0] - end) <= reach for p in points)
 
     @staticmethod
     def element_of(mesh: Mesh, point: ContactPoint) -> tuple[PairKey, int] | None:

@@ -8,7 +8,7 @@ Where members pass edges is a question of its own, see :mod:`~sfetcas.contact.ed
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -58,15 +58,7 @@ class Passing:
     def crossed(self, before: Fields, after: Fields) -> list[Near]:
         """Where members are nearest in one state that are on other sides of each other in another one."""
         pairs = [pair for pair in self.closest.pairs.values() if pair.passable]
-        moved = 0.0
-        for member in {member for pair in pairs for member in pair.members}:
-            x = self.closest.samples(after.model.mesh, member)
-            places = after.positions(member, x), before.positions(member, x)
-            seen = {pair.contact for pair in pairs if member in pair.members}
-            for contact in seen:
-                one, other = (f.seen(contact, p, p)[0] for f, p in zip((after, before), places, strict=True))
-                moved = max(moved, float(np.linalg.norm(one - other, axis=1).max()))
-        found = self.closest.found(before, 2.0 * moved, pairs)
+        found = self.closest.found(before, 2.0 * self._farthest(before, after, pairs), pairs)
         vectors = Placed(self.scene, after, found).vectors
         crossed = [near for near, vector in zip(found, vectors, strict=True) if near.normal @ vector <= 0.0]
         angle = tangents_turned(before, after) if self.edges.pairs else 0.0
@@ -76,10 +68,9 @@ class Passing:
         """Whether places of members that move straight from one state to another come inside of a round obstacle that
         these touch in neither.
         """
-        one, other = ({point.pair for point in fields.model.mesh.points} for fields in (before, after))
-        for pair, stop, a, b in self._moves(before, after, one | other):
-            if not pair.passable:
-                continue
+        touched = _touching(before) | _touching(after)
+        pairs = [pair for pair in self.closest.pairs.values() if pair.passable and pair.key not in touched]
+        for pair, stop, a, b in self._moves(before, after, pairs):
             first, way = (a - stop.place) @ stop.across, (b - a) @ stop.across
             size = np.maximum(np.einsum("ni,ni->n", way, way), TINY)
             share = np.clip(-np.einsum("ni,ni->n", first, way) / size, 0.0, 1.0)
@@ -91,59 +82,81 @@ class Passing:
         """Whether places of members that turn may have been inside of what these touch in one state at most: they move
         on arcs, of which the middle is an eighth of their length times the angle aside of the straight way.
         """
-        middle = 0.125 * tangents_turned(before, after)
-        one, other = ({point.pair for point in fields.model.mesh.points} for fields in (before, after))
-        for pair, stop, a, b in self._moves(before, after, one & other):
+        middle, touched = 0.125 * tangents_turned(before, after), _touching(before) & _touching(after)
+        pairs = [pair for pair in self.closest.pairs.values() if pair.key not in touched]
+        for pair, stop, a, b in self._moves(before, after, pairs):
             far = np.linalg.norm(b - a, axis=1)
             for share in SHARES:
                 here = a + share * (b - a)
                 apart = np.einsum("ni,ni->n", (here - stop.place) @ stop.across, stop.normals(here, here))
-                aside = 4.0 * share * (1.0 - share) * middle * far
-                if (apart - pair.distance < aside - self.tolerance).any():
+                if (apart - pair.distance < _risen(middle, share) * far - self.tolerance).any():
                     return True
-        return self._bulged_between(before, after, middle, one & other)
+        return self._bulged_between(before, after, [pair for pair in pairs if pair.stop is None], middle)
 
-    def _bulged_between(self, before: Fields, after: Fields, middle: float, known: Collection[PairKey]) -> bool:
-        """As :meth:`bulged` between members on the same elements, none of ``known`` pairs."""
-        keys = {key for key, pair in self.closest.pairs.items() if pair.stop is None} - {*known}
-        if not keys or not before.model.mesh.same(replace(after.model.mesh, points=before.model.mesh.points)):
+    def _bulged_between(self, before: Fields, after: Fields, pairs: Sequence[Pair], middle: float) -> bool:
+        """As :meth:`bulged` between members, on the same elements."""
+        if not pairs or not before.model.mesh.same(replace(after.model.mesh, points=before.model.mesh.points)):
             return False
-        moved = (
-            np.linalg.norm(after.positions(name, x) - before.positions(name, x), axis=1).max()
-            for name in {name for key in keys for name in key[1]}
-            for x in [self.closest.samples(after.model.mesh, name)]
-        )
-        reach = 2.0 * middle * float(max(moved))
+        reach = 2.0 * middle * self._farthest(before, after, pairs)
         if reach <= self.tolerance:
             return False
+        keys = {pair.key for pair in pairs}
         for share in SHARES:
-            for near, far in self.closest.between(before, after, share, reach):
-                if near.pair in keys and near.gap < 4.0 * share * (1.0 - share) * middle * far - self.tolerance:
+            found = [near for near in self.closest.on_way(before, after, share, reach) if near.pair in keys]
+            ends = zip(*(Placed(self.scene, fields, found).vectors for fields in (before, after)), strict=True)
+            for near, (one, other) in zip(found, ends, strict=True):
+                if near.gap < _risen(middle, share) * float(np.linalg.norm(other - one)) - self.tolerance:
                     return True
         return False
 
+    def _farthest(self, before: Fields, after: Fields, pairs: Sequence[Pair]) -> float:
+        """How far places of members of some pairs move at most, m, as obstacles see them."""
+        moved = 0.0
+        for member in {member for pair in pairs for member in pair.members}:
+            x = self.closest.samples(after.model.mesh, member)
+            places = before.positions(member, x), after.positions(member, x)
+            for contact in {pair.contact for pair in pairs if member in pair.members}:
+                a, b = _seen(contact, (before, after), places)
+                moved = max(moved, float(np.linalg.norm(b - a, axis=1).max()))
+        return moved
+
     def _moves(
-        self, before: Fields, after: Fields, known: Collection[PairKey]
+        self, before: Fields, after: Fields, pairs: Iterable[Pair]
     ) -> Iterator[tuple[Pair, Obstacle, Array, Array]]:
-        """Of members and obstacles that are no ``known`` pairs places (n, 3) in both states, as obstacles see them."""
-        for pair in self.closest.pairs.values():
-            if pair.stop is None or pair.edge or pair.key in known:
+        """Of pairs with an obstacle, but edges, that and places (n, 3) of the member in both states as it sees them."""
+        for pair in pairs:
+            if pair.stop is None or pair.edge:
                 continue
             x = self.closest.samples(after.model.mesh, pair.members[0])
-            places = (f.positions(pair.members[0], x) for f in (before, after))
-            a, b = (f.seen(pair.contact, p, p)[0] for f, p in zip((before, after), places, strict=True))
-            yield pair, pair.stop, a, b
+            places = before.positions(pair.members[0], x), after.positions(pair.members[0], x)
+            yield pair, pair.stop, *_seen(pair.contact, (before, after), places)
 
     def aside(self, before: Fields, after: Fields) -> bool:
         """Whether what begins to touch a round obstacle does so far round it from where it was: it may have gone deep
         into it on the way, where that pushes it to another side.
         """
-        had = {point.pair for point in before.model.mesh.points}
+        had = _touching(before)
         begun = [p for p in points_in(after) if len(p.members) == 1 and not p.edge and p.pair not in had]
         earlier, now = (Placed(self.scene, fields, begun) for fields in (before, after))
         stops = (self.closest.pairs[point.pair].stop for point in begun)
         cosines = [earlier.normal(i, stop) @ now.normal(i, stop) for i, stop in enumerate(stops)]
         return min(cosines, default=1.0) < np.cos(ROUND)
+
+
+def _touching(fields: Fields) -> set[PairKey]:
+    """The pairs that touch in a state."""
+    return {point.pair for point in fields.model.mesh.points}
+
+
+def _seen(contact: str, states: tuple[Fields, Fields], places: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Places (n, 3) in two states as the obstacle of a contact sees them."""
+    one, other = (fields.seen(contact, here, here)[0] for fields, here in zip(states, places, strict=True))
+    return one, other
+
+
+def _risen(middle: float, share: float) -> float:
+    """How far an arc is from the straight way at a share of that, over its length, by that in its middle."""
+    return 4.0 * share * (1.0 - share) * middle
 
 
 def tangents_turned(before: Fields, after: Fields) -> float:

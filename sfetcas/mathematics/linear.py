@@ -379,10 +379,8 @@ class InertiaSolver:
 
     Parameters
     ----------
-    n : int
-        Size of the matrix.
-    row, column : ndarray
-        Positions of the entries, column by column, with the whole diagonal.
+    n, row, column
+        As of :class:`SparseSolver`.
     """
 
     def __init__(self, n: int, row: Array, column: Array) -> None:
