@@ -235,6 +235,7 @@ ORDER = [
     "paths.path",
     "paths.vibrations",
     "paths.lying",
+    "paths.rubbing",
     "paths.conditions",
     "paths.touching",
     "paths.switching",

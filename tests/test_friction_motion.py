@@ -69,11 +69,6 @@ METHODS = pytest.mark.parametrize(
         ("rough", {"type": "dynamic", "end": 1.0}, "contacts.plane.friction: found 'rough', accepted: a number"),
         (
             0.3,
-            {"type": "path", "range": [0, 1]},
-            "contacts.plane: found friction with analysis.type = 'path', accepted: with 'static', where the order",
-        ),
-        (
-            0.3,
             {"type": "dynamic", "end": 1.0, "integrator": "idas"},
             "contacts.plane: found with the integrator 'idas'",
         ),

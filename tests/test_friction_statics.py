@@ -247,8 +247,6 @@ def test_wrong_input_is_told_in_one_sentence(more, sentence):
 
 
 def test_analyses_that_have_no_order_are_refused():
-    with pytest.raises(SceneError, match=r"found friction with analysis\.type = 'path', accepted"):
-        cantilever((0, -3), TIP_FLOOR | {"friction": 0.1}, analysis={"type": "path", "range": [0, 1]})
     with pytest.raises(
         SceneError, match=r"^analysis\.equilibria: found 'all' with contacts\.c\.friction, accepted: 'one'"
     ):

@@ -25,7 +25,7 @@ from ..mechanics.mesh import ContactPoint, Mesh, breaks_of
 from ..mechanics.segments import SAME_CUT, beside_line
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.redundancy import redundant
-from .lines import Points, points_of
+from .lines import Points, on_line, points_of
 from .member_contact import MemberContact
 from .pairs import Near, Pair, PairKey
 
@@ -82,7 +82,7 @@ class Kept:
         self.run = run = MemberContact(scene, prepare, accuracy, fixed)
         self.closest = run.closest
         points = points_of(rest)
-        run.lines.keys = frozenset(point.pair for point in points if _on_line(point))
+        run.lines.keys = frozenset(point.pair for point in points if on_line(point))
         # Where members roll over nodes they slide.
         rolling = points_of(run.rolling(rest, lambda model: model.loading(rest.factor)))
         single = (_firm(point) for point in rolling if point.pair not in run.lines.keys)
@@ -319,10 +319,3 @@ def _where(one: ContactPoint | Near) -> str:
 def _places(one: ContactPoint | Near) -> str:
     """``beam at 0.5``."""
     return " and ".join(f"{member} at {x:.4g}" for member, x in zip(one.members, one.at, strict=True))
-
-
-def _on_line(point: ContactPoint) -> bool:
-    """Whether a point stands for a line: it stays on the first of two members within that."""
-    if len(point.members) == 1:
-        return point.line
-    return all(0.0 < x < 1.0 for x in point.at) and not point.slides[0] and not point.new

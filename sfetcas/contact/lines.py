@@ -26,7 +26,18 @@ from ..solvers.prepared import Solved
 from .closest import LIFTED, Closest
 from .pairs import ONE, SAME, Near, Pair, PairKey
 
-__all__ = ["LINE", "SHORT_LINE", "Lines", "Points", "begun", "ends_of", "lies_along", "points_in", "points_of"]
+__all__ = [
+    "LINE",
+    "SHORT_LINE",
+    "Lines",
+    "Points",
+    "begun",
+    "ends_of",
+    "lies_along",
+    "on_line",
+    "points_in",
+    "points_of",
+]
 
 Points = tuple[ContactPoint, ...]
 
@@ -720,6 +731,13 @@ def lies_along(points: Iterable[ContactPoint]) -> bool:
     """Whether some points stand for a line on an obstacle."""
     alone = (point for point in points if len(point.members) == 1 and not point.new)
     return any(point.line or (not point.slides[0] and 0.0 < point.at[0] < 1.0) for point in alone)
+
+
+def on_line(point: ContactPoint) -> bool:
+    """Whether a point stands for a line: it stays on the first of two members within that."""
+    if len(point.members) == 1:
+        return point.line
+    return all(0.0 < x < 1.0 for x in point.at) and not point.slides[0] and not point.new
 
 
 def beside_ends(one: ContactPoint | Near) -> bool:

@@ -43,7 +43,7 @@ from .lines import LINE, SHORT_LINE, Lines, Points, begun, ends_of, points_of
 from .pairs import ONE, Near, Pair, PairKey, penetrating
 from .passing import Passing, tangents_turned
 
-__all__ = ["FITS", "LESS", "MORE", "MemberContact", "Way"]
+__all__ = ["FITS", "LESS", "MORE", "STRIDE", "MemberContact", "Way"]
 
 Way = Callable[[Model], Loading]
 """The loading of a model."""
@@ -197,6 +197,8 @@ class MemberContact:
     across : callable or None
         Model -> its curve and a direction on it: where it is given the factor of the loads is an unknown, from that of
         the near state on, and the equilibrium one across the direction, see :meth:`.Curve.corrected`.
+    within : callable or None
+        Whether an equilibrium is near enough to be the one that is looked for: with friction one may be far beyond.
     """
 
     def __init__(
@@ -218,6 +220,7 @@ class MemberContact:
         self.edges = Edges(scene, self.closest, self.tolerance)
         self.passing = Passing(scene, self.closest, self.edges, self.tolerance)
         self.across: Callable[[Prepared], tuple[Curve, Tangent]] | None = None
+        self.within: Callable[[Solved], bool] | None = None
 
     def hold(self, fixed: Collection[str]) -> None:
         """Take the mesh of other members for prescribed."""
@@ -332,10 +335,11 @@ class MemberContact:
                 pushing, near = pressing or (numbered, source)
                 set_up = self.gripping.set_up(near.fields, mesh, pushing)
                 found = self._corrected(replace(mesh, points=set_up), near, way, since, drag)
-                if found is not None:
+                if found is not None and (self.within is None or self.within(found)):
                     return found
             self.gripping.change()
-        return self._softly(mesh, numbered, source, way, since, drag) if self.scene.rubs and points else None
+        found = self._softly(mesh, numbered, source, way, since, drag) if self.scene.rubs and points else None
+        return found if found is None or self.within is None or self.within(found) else None
 
     def _pressing(
         self, mesh: Mesh, points: list[ContactPoint], source: Solved, way: Way, since: Solved | None, drag: float
@@ -464,7 +468,7 @@ class MemberContact:
         model, scene, moved = prepared.model, self.scene, list[int]()
         there = transferred(since.model, since.state, model)
         number = {name: i for i, name in enumerate(model.positions.unknowns)}
-        y, loose = there.y.copy(), self._travels(model.mesh)
+        y, loose = there.y.copy(), self.travels(model.mesh)
         loose = loose if loose <= number.keys() else frozenset(number)
         for name, node in scene.nodes.items():
             ways = {f"{name}.{c}": axis for c, axis in zip("xyz"[: model.element.axes], np.eye(3))}
@@ -474,7 +478,7 @@ class MemberContact:
                 moved.append(number[label])
         return Drag(prepared.equations, replace(there, y=y), size, np.array(moved, np.intp))
 
-    def _travels(self, mesh: Mesh) -> frozenset[str]:
+    def travels(self, mesh: Mesh) -> frozenset[str]:
         """Names of the displacements of nodes that are unknowns where nothing touches."""
         if self._loose is None:
             nodes = {f"{prefix}{name}" for name in self.scene.nodes for prefix in ("", "travel of ")}
@@ -513,8 +517,8 @@ class MemberContact:
             change = source.fields.positions(member, x) - target.scene.center_lines[member].positions(x)
             displaced[member] = change / unit
         for i, point in enumerate(target.mesh.points):
-            moved = source.fields.motion_of(point.contact)
-            now_apart = placed.vectors[i] if moved is None else moved[0] @ placed.vectors[i]
+            turn = source.fields.motion_of(point.contact)
+            now_apart = placed.vectors[i] if turn is None else turn[0] @ placed.vectors[i]
             change = (now_apart - begin[i])[:axes] / unit
             if point.line:
                 # Nothing has slipped yet.
@@ -541,10 +545,12 @@ class MemberContact:
                     force = source.state.y[[had[f"{former.pressed}, {share}"] for share in shares]]
                     y[[numbers[f"{point.pressed}, {share}"] for share in shares]] = force
                     rubs = float(np.linalg.norm(force[1:]))
-                    if point.line and rubs >= (1.0 - SLIPPED) * point.grip.coefficient * force[0] > 0.0:
+                    if rubs >= (1.0 - SLIPPED) * point.grip.coefficient * force[0] > 0.0:
                         # What has slid slides on.
-                        along = [numbers[f"{point.between}, {share}"] for share in shares[1:]]
-                        y[along] -= SLIPPED * force[1:] / rubs
+                        way = force[1:] if point.line else np.array(point.grip.frame).T @ force[1:]
+                        way = way if point.line or turn is None else turn[0] @ way
+                        parts = names[1:axes] if point.line else names[:axes]
+                        y[[numbers[f"{point.between}, {name}"] for name in parts]] -= SLIPPED * way[: len(parts)] / rubs
         return replace(state, y=y, lam=lam)
 
     @staticmethod
@@ -841,7 +847,7 @@ class MemberContact:
             narrow = min(NARROW, SOONER * now.part) if now.part > 0.0 else EARLIEST
             part, lines = min(1.0, now.part + min(step, 1.0 / max(turn, 1.0))), self.lines.keys
             self.patient = step > PATIENT
-            there = self._next(mesh, now.solved, way(part))
+            there = self.stepped(mesh, now.solved, way(part))
             self.patient = False
             # Along lines places begin to touch all the time, near to where they do.
             single = [] if there is None else [p for p in there.model.mesh.points if p.pair not in self.lines.keys]
@@ -894,15 +900,19 @@ class MemberContact:
             now, step = _Step(part, there), longer * (part - now.part) if not falling else self.first
         return now.solved
 
-    def _next(self, mesh: Mesh, now: Solved, way: Way) -> Solved | None:
-        """The state at the end of a step of a way; None where it is not found, or too far away."""
+    def stepped(self, mesh: Mesh, now: Solved, way: Way, near: Solved | None = None) -> Solved | None:
+        """The state at the end of a step of a way; None where it is not found, or too far away.
+
+        ``near`` is what is expected there, ``now`` by default.
+        """
+        near = near or now
         self.gripping.since = now.fields
-        points = tuple(map(self.gripping.begun, points_of(now)))
-        there = self.resolved(mesh, points, now, way)
+        points = tuple(map(self.gripping.begun, points_of(near)))
+        there = self.resolved(mesh, points, near, way)
         crossings = [] if there is None else self.passing.crossed(now.fields, there.fields)
         if crossings:
             # Members thinner than the step is long touch where they were nearest before.
-            there = self.resolved(mesh, (*points, *map(begun, crossings)), now, way)
+            there = self.resolved(mesh, (*points, *map(begun, crossings)), near, way)
             crossings = [] if there is None else self.passing.crossed(now.fields, there.fields)
         if there is None or crossings:
             return None

@@ -92,7 +92,7 @@ class Contact(Record):
         Radius of the surface of the members that an obstacle stops; by default their centre line touches it.
     friction : 1
         Coulomb's coefficient: the largest force along the surfaces over that across them; in statics, where it counts
-        in which order the steps come, and in motions.
+        in which order the steps come, on paths, and in motions.
     restitution : 1
         Speed across the surfaces after an impact over that before, from 0 to 1; of motions alone.
     """

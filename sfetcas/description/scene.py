@@ -1039,11 +1039,8 @@ def _check_points(scene: Scene) -> None:
     name, what = next(((name, why) for name, why in reasons if why), ("", ""))
     if not what:
         return
-    on_path = scene.analysis.type == "path"
-    if on_path and scene.rubs:
-        name, what = next((name, "friction") for name, contact in scene.contacts.items() if contact.friction > 0.0)
     where, found = ("contacts", name), f"found {what}"
-    if scene.analysis.type not in ("static", "modes") and (scene.rubs or not on_path):
+    if scene.analysis.type not in ("static", "modes", "path"):
         message = f"{found} with analysis.type = {scene.analysis.type!r}"
         known = {"friction": "'static', where the order of steps is known, or 'dynamic'"}
         accepted = known.get(what, "'static' or 'path'")

@@ -209,6 +209,7 @@ class RoughGap(Term):
         "push": "N",
         **{f"friction {axis}": "N" for axis in "xyz"},
         **{f"slip {axis}": "m" for axis in "xyz"},
+        "beyond": "N",
     }
 
     @property
@@ -226,6 +227,16 @@ class RoughGap(Term):
         """Its places; no rows."""
         data = self.smooth.sizes[3] + 3 + self.axes * (self.axes + 2 * self.members)
         return self.smooth.sizes[0], 2 + self.members, 0, data, 0
+
+    def _law(
+        self, u: list[Side], data: ca.SX, friction: ca.SX, slip: ca.SX
+    ) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
+        """The slip less what it gives way by, the force that the law is for, its size, its limit, how firm it is."""
+        first = self.smooth.sizes[3]
+        coefficient, firm, yields = ca.vertsplit(data[first : first + 3])
+        slipped = slip + yields * friction
+        way = friction - firm * slipped
+        return slipped, way, ca.sqrt(ca.dot(way, way) + NOWHERE), coefficient * ca.fmax(u[1][0], 0.0), firm
 
     def _parts(self, q: list[Side], u: list[Side], data: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, list[ca.SX]]:
         """The gap, its normal, friction (axes,), the slip (axes,), and the tangents of the members, all as seen from
@@ -249,12 +260,10 @@ class RoughGap(Term):
         """On the vector minus the force of the point; on the forces what they miss; along the members."""
         gap, normal, friction, slip, tangents = self._parts(q, u, data)
         first, n = self.smooth.sizes[3], self.axes
-        coefficient, firm, yields = ca.vertsplit(data[first : first + 3])
+        yields = data[first + 2]
         frame = ca.vertsplit(data[first + 3 :], n)[: n - 1]
         # The nearest force to w that Coulomb's law allows.
-        slipped = slip + yields * friction
-        way, limit = friction - firm * slipped, coefficient * ca.fmax(u[1][0], 0.0)
-        size = ca.sqrt(ca.dot(way, way) + NOWHERE)
+        slipped, way, size, limit, firm = self._law(u, data, friction, slip)
         # What is new sticks: how hard it pushes is not known yet.
         held = ca.logic_or(size <= limit, firm <= 0.0)
         missing = []
@@ -277,10 +286,14 @@ class RoughGap(Term):
         return ca.vertsplit(moment), ca.vertsplit(turned)
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
-        """The force across, friction (3,) on the first member, and how far that has slipped (3,)."""
+        """The force across, friction (3,) on the first member, how far that has slipped (3,), and by how much the force
+        that the law is for is beyond its limit, so that it slides.
+        """
         _, _, friction, slip, _ = self._parts(q, u, data)
+        _, _, size, limit, _ = self._law(u, data, friction, slip)
         nothing = [ca.SX(0)] * (3 - self.axes)
-        return [u[1][0], *self._on(q, u, data, friction)[1], *nothing, *ca.vertsplit(slip), *nothing]
+        forces = [u[1][0], *self._on(q, u, data, friction)[1], *nothing]
+        return [*forces, *ca.vertsplit(slip), *nothing, size - limit]
 
 
 LEAST_YIELDING = 1e-13

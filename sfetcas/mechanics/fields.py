@@ -197,7 +197,7 @@ class Fields:
 
         With friction ``push`` is the size of the part across, ``friction`` (3,) N the part along, ``slip`` (3,) m how
         far the first one has slipped since the last state of the way, ``rubs`` N the size that the law of friction is
-        for, and ``sticks`` whether it sticks.
+        for, ``sticks`` whether it sticks by more than little, and ``slides`` whether it has slid since then.
         """
         found, lines = self.balance.answers("contacts", point.name), self.model.scene.center_lines
         moved = (found.get("moved on first", 0.0), found.get("moved on second", 0.0))
@@ -218,6 +218,7 @@ class Fields:
             size = float(np.linalg.norm([found[f"friction {axis}"] for axis in "xyz"]))
             limit = point.grip.coefficient * found["push"]
             answer |= {"friction": friction, "slip": slip, "rubs": size, "sticks": bool(size < limit * (1.0 - SLIDES))}
+            answer["slides"] = bool(found["beyond"] > 0.0)
         return answer
 
     def _line_forces(self, point: ContactPoint) -> Array:

@@ -95,6 +95,9 @@ class Conditions(ABC, Generic[One]):
     choosing: ClassVar[str]
     """What a choice says, in a sentence."""
 
+    remembers: ClassVar[bool] = False
+    """Whether each point remembers the one before it, so that all of a path is followed by what :meth:`lying` gives."""
+
     @property
     @abstractmethod
     def any(self) -> bool:

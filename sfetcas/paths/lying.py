@@ -18,7 +18,7 @@ import numpy as np
 
 from ..contact.lines import Points, lies_along, points_of
 from ..contact.member_contact import FITS, MemberContact
-from ..mathematics.arrays import TINY
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.fields import transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import ContactPoint, Mesh
@@ -29,7 +29,7 @@ from ..solvers.critical import Event, root
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.tracing import FIRST, SHORTEST, STRIDE, TURNING, Traced, longest
 
-__all__ = ["Lying", "Piece"]
+__all__ = ["LEVEL", "SHARE", "SHARPEST", "Lying", "Piece"]
 
 Piece = Callable[[float, float], tuple[float, float]]
 """(factor, sign of its rate) -> range of factors without a knot of a history."""
@@ -127,12 +127,17 @@ class Lying:
 
     def along(self, now: Standing, prepared: Prepared) -> tuple[Curve, Tangent]:
         """The curve of another model, and on it the tangent at a point: its rotations and its factor."""
+        curve, z = self.turning(now, prepared)
+        return curve, curve.normed(Tangent(z, now.tangent.factor))
+
+    def turning(self, now: Standing, prepared: Prepared) -> tuple[Curve, Array]:
+        """The curve of another model, and the rates (total,) of its rotations by the arc length at a point."""
         aside = now.equations.moved(now.state, ASIDE * now.tangent.z)
         curve = Curve(prepared, self.unit, self.piece(now.factor, now.tangent.factor))
         one, other = (transferred(now.model, state, prepared.model) for state in (now.state, aside))
         z, turned = np.zeros(curve.equations.total), turned_between(curve.equations, other, one, near=True)
         z[: len(turned)] = turned / ASIDE
-        return curve, curve.normed(Tangent(z, now.tangent.factor))
+        return curve, z
 
     def _found(self, source: Solved, now: Solved, begins: Sequence[ContactPoint], fits: int) -> Solved | None:
         """What is near to a state that is expected after another one, under its loads or across a tangent."""
@@ -220,12 +225,14 @@ class Lying:
         there = there or self.ahead(now, length)
         if there is None or self._angle(now, there) > SHARPEST * TURNING:
             return None, None
+        end = self._end(now, there)
+        return (there, None) if end is None else (self.at_factor(now, end), end)
+
+    def _end(self, now: Standing, there: Standing) -> float | None:
+        """The end of the range, or the knot of a history, that is between two points; None where there is none."""
         low, high = self.piece(now.factor, now.tangent.factor)
         low, high = max(low, self.span[0]), min(high, self.span[1])
-        if low <= there.factor <= high:
-            return there, None
-        end = low if there.factor < low else high
-        return self.at_factor(now, end), end
+        return None if low <= there.factor <= high else low if there.factor < low else high
 
     def _angle(self, a: Standing, b: Standing) -> float:
         """Angle between the tangents at two points, rad."""
@@ -250,13 +257,23 @@ class Lying:
 
     def crossings(self, points: Sequence[Standing], factors: tuple[float, ...]) -> list[Standing]:
         """The points at given factors, in their order along the path; one at the end of a range is as it is."""
+        return self._crossings(
+            points, factors, lambda a, b, factor: min(a, b, key=lambda one: abs(one.factor - factor))
+        )
+
+    def _crossings(
+        self,
+        points: Sequence[Standing],
+        factors: tuple[float, ...],
+        near: Callable[[Standing, Standing, float], Standing],
+    ) -> list[Standing]:
+        """As :meth:`crossings`, each found from one of the points between which it is."""
         met = [points[0]] if points[0].factor in factors else []
         for a, b in itertools.pairwise(points):
             low, high = min(a.factor, b.factor), max(a.factor, b.factor)
             within = [factor for factor in dict.fromkeys(factors) if low < factor < high]
             for factor in sorted(within, reverse=bool(b.factor < a.factor)):
-                near = min(a, b, key=lambda one: abs(one.factor - factor))
-                found = self.at_factor(near, factor)
+                found = self.at_factor(near(a, b, factor), factor)
                 met += [] if found is None else [found]
             met += [b] if b.factor in factors else []
         return met

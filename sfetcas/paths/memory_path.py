@@ -18,7 +18,6 @@ from ..mathematics.arrays import Array
 from ..mechanics.accuracy import largest_difference
 from ..mechanics.mesh import Mesh
 from ..solvers.arclength import Curve, Standing
-from ..solvers.critical import at_factors
 from .switching import Followed
 
 __all__ = ["HILL", "MISSING", "chosen_of", "left_along", "refined_by_fronts", "sampled_again", "steps_of"]
@@ -54,16 +53,19 @@ def chosen_of(curve: Curve, traced: Followed, steady: float, count: int) -> list
     return [points[i] for i in places]
 
 
-def sampled_again(chosen: list[Standing], coarse: Followed, curve: Curve, fine: Followed) -> float:
+def sampled_again(
+    chosen: list[Standing], coarse: Followed, fine: Followed, met_at: Callable[[list[Standing], float], list[Standing]]
+) -> float:
     """Largest difference of chosen points of a coarse stretch from those of a fine one with the same factors.
 
-    Each is looked for between the same limit points, between which each factor occurs once.
+    Each is looked for between the same limit points, between which each factor occurs once; ``met_at`` finds the points
+    of a stretch at a factor.
     """
     largest = 0.0
     for part, other in zip(_monotone(coarse), _monotone(fine), strict=False):
         own = {id(point) for point in part}
         for one in (point for point in chosen if id(point) in own):
-            met = at_factors(curve, other, (one.factor,))
+            met = met_at(other, one.factor)
             if met:
                 largest = max(largest, largest_difference(one.fields, met[0].fields))
     return largest
@@ -72,6 +74,7 @@ def sampled_again(chosen: list[Standing], coarse: Followed, curve: Curve, fine: 
 def _monotone(traced: Followed) -> list[list[Standing]]:
     """The points from one limit point to the next, both included."""
     limits = {id(event.standing) for event in traced.events if event.kind == "limit"}
+    limits |= {id(change.standing) for change in traced.transitions if change.turns}
     ends = [i for i, point in enumerate(traced.points) if id(point) in limits]
     return [traced.points[a : b + 1] for a, b in zip([0, *ends], [*ends, len(traced.points) - 1], strict=True)]
 

@@ -371,6 +371,7 @@ def ending(end: str, factor: float, count: int, message: str) -> str:
         "range": f"the factor leaves the range at {factor:g}",
         "points": f"{count} points",
         "closed": "it closes on itself",
+        "away": f"from factor {factor:.9g} on what touches slides away under the same loads",
         "lost": f"it could not be followed beyond factor {factor:.6g}",
         "margin": f"it ends at factor {factor:.6g}: {message}",
         "bent": f"beyond factor {factor:.6g} {message}",

@@ -34,7 +34,7 @@ from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.beginning import check_slack
-from ..solvers.critical import Event, shapes_at
+from ..solvers.critical import Event, at_factors, shapes_at
 from ..solvers.prepared import Prepared
 from ..solvers.redundancy import with_sharing
 from ..solvers.residuals import relative_residual
@@ -85,6 +85,12 @@ EVALUATIONS = 500.0
 """About as often the equations are evaluated along a path."""
 
 LYING = "limit points are located along obstacles on which members lie; bifurcations there are not looked for"
+"""A note."""
+
+RUBS = (
+    "with friction: each point remembers what has slipped before it; limit points are located, bifurcations are not "
+    "looked for"
+)
 """A note."""
 
 LEAST_WAY = 1e-3
@@ -275,6 +281,8 @@ class PathTracing:
         knots = {t for h in scene.histories.values() for t in h.knots if self.span[0] < t < self.span[1]}
         self.knots = tuple(sorted(knots))
         self.points = steps_of(scene.analysis) if scene.remembers else scene.analysis.points
+        self.one_sequence = scene.remembers or scene.rubs
+        self.levels = 0
 
     # -- meshes ---------------------------------------------------------------------------------
 
@@ -282,13 +290,13 @@ class PathTracing:
         """The path, with its branches, on a mesh fine enough for the accuracy."""
         begin = time.perf_counter()
         mesh, last = self._first_mesh(), np.inf
-        self.base = None if self.scene.remembers else mesh
+        self.base = None if self.one_sequence else mesh
         coarse = self._level(mesh)
         if self.fixed == set(self.scene.members):
             errors = self._errors(coarse, self._level(self._halved(mesh)), whose=coarse)
             return self._answer(coarse, errors, begin)
         # The error falls by 4^p a halving; less is taken for granted.
-        gain, stalled = 1.0 if self.scene.remembers else max(1.0, 4.0**mesh.order / MARGIN), 0
+        gain, stalled = 1.0 if self.one_sequence else max(1.0, 4.0**mesh.order / MARGIN), 0
         for count in range(LEVELS):
             coarse = self._with_fronts(coarse)
             fine = self._level(self._halved(coarse.choices.mesh))
@@ -351,7 +359,9 @@ class PathTracing:
         sizes = [(len(cuts) - 1) / (len(base.cuts[name]) - 1) for name, cuts in mesh.cuts.items()]
         times = int(np.log2(max(sizes, default=1.0)))
         finer = functools.partial(self._halved, times=times)
-        found = Choices(mesh, self._prepared, self.span, self.knots, self.conditions, base, finer, times)
+        # With friction steps are halved as well.
+        halvings = max(self.levels - 1, 0) if self.scene.rubs else times
+        found = Choices(mesh, self._prepared, self.span, self.knots, self.conditions, base, finer, halvings)
         found.unit = unit or found.unit
         return found
 
@@ -377,6 +387,7 @@ class PathTracing:
         return mesh
 
     def _level(self, mesh: Mesh) -> _Level:
+        self.levels += 1
         choices = self.choices(mesh)
         first, notes = choices.begin(self.first)
         main = _Stretch(choices.follow(first, self.points, MISSING * self.accuracy))
@@ -396,7 +407,7 @@ class PathTracing:
         for number, (on, event) in enumerate(bends[: self.analysis.branches], start=1):
             for side in (1, -1):
                 self._add_branch(level, on, event, number, side)
-        level.notes += (*_beside(main.traced.near), *_lying(level.stretches))
+        level.notes += (*_beside(main.traced.near), *(() if self.scene.rubs else _lying(level.stretches)))
         level.stretches = [self.stretch(part, choices) for part in level.stretches]
         return level
 
@@ -452,17 +463,20 @@ class PathTracing:
             for kind in ("limit", "bifurcation", "transition", "step"):
                 ours, theirs = (s.crossings if kind == "step" else s.of_kind(kind) for s in (a, b))
                 # Where places begin to yield steps are short: paths of so many points do not end at one place.
-                cut = self.scene.remembers and "points" in (a.traced.end, b.traced.end)
+                cut = self.one_sequence and "points" in (a.traced.end, b.traced.end)
                 if len(ours) != len(theirs) and not cut:
                     errors[i, kind, -1] = np.inf
                 for j, (one, other) in enumerate(zip(ours, theirs, strict=False)):
                     factor = abs(one.factor - other.factor) / max(abs(other.factor), tolerances.UNIT * self._widest)
                     errors[i, kind, j] = max(largest_difference(one.fields, other.fields), factor)
-            if not self.scene.remembers:
+            if not self.one_sequence:
                 errors[i, "samples", 0] = self._sampled(coarse, a.traced, fine)
                 continue
             chosen = chosen_of(coarse.curve, a.traced, STEADY, SAMPLES)
-            errors[i, "samples", 0] = sampled_again(chosen, a.traced, fine.curve, b.traced)
+            met_at = functools.partial(self._met_at, fine)
+            errors[i, "samples", 0] = sampled_again(chosen, a.traced, b.traced, met_at)
+            if not self.scene.remembers:
+                continue
             level, part = (coarse, a) if whose is coarse else (fine, b)
             left = left_along(level.curve, self._watched(level.curve, part))
             errors[i, "fronts", 0], errors[i, "missed", 0] = left(np.inf), part.traced.missed
@@ -471,6 +485,13 @@ class PathTracing:
                     if (i, kind, j) in errors:
                         errors[i, kind, j] = max(errors[i, kind, j], left(point.arc))
         return errors
+
+    def _met_at(self, level: _Level, points: list[Standing], factor: float) -> list[Standing]:
+        """The points at a factor along a stretch of a path of which each point remembers the one before."""
+        if self.scene.rubs:
+            assert level.choices.lying is not None
+            return level.choices.lying.crossings(points, (factor,))
+        return at_factors(level.curve, points, (factor,))
 
     @property
     def _widest(self) -> float:
@@ -518,7 +539,8 @@ class PathTracing:
 
     def _means(self, curve: Curve) -> tuple[str, ...]:
         """What limit points and bifurcations mean, where that is not what they usually do."""
-        return (*(() if curve.model.conservative else (NO_POTENTIAL,)), *((HILL,) if self.scene.remembers else ()))
+        rubs = (RUBS,) if self.scene.rubs else () if curve.model.conservative else (NO_POTENTIAL,)
+        return (*rubs, *((HILL,) if self.scene.remembers else ()))
 
     def answered(self, prepared: Prepared, stretch: _Stretch, errors: dict[tuple[str, int], float]) -> Branch:
         """A traced branch as a :class:`Branch`, with the estimated errors of its points, on a path of ``prepared``."""

@@ -62,6 +62,9 @@ BESIDE = (1e-3, 1e-2, 5e-2, 0.2)
 S = TypeVar("S", Event, Standing)
 """What is located."""
 
+TURNS = "the factor turns there, at a corner"
+"""A note."""
+
 BRIEF = 4
 """Points between the end of a line and the begin of another one, up to which the path goes to and fro between these."""
 
@@ -271,14 +274,14 @@ class Choices:
             return First(curve, start), notes
         curve, start, notes = self.conditions.begin(self.prepared, self.span, first)
         self.unit = curve.unit
-        if lies_along(start.model.mesh.points):
+        if lies_along(start.model.mesh.points) and not self.conditions.remembers:
             laid = self._lying.at_factor(start, start.factor)
             if laid is None:
                 detail = f"what lies along obstacles at factor {start.factor:g} was not found on the mesh of the path"
                 raise SolveError(Status.FAILED, detail, start.state)
             return First(curve, laid), notes
         near = self.conditions.near(start.fields)
-        if not near:
+        if not near or self.conditions.remembers:
             return First(curve, start), notes
         up = 1.0 if self.span[1] > 0.0 else -1.0
         refused = self._refused(start, near)
@@ -308,7 +311,7 @@ class Choices:
         watch, passed = (self._watched, self.conditions.passed) if self.conditions.any else (None, None)
         while True:
             left = max(1, count - found.count) if found.parts else count
-            if lies_along(first.standing.model.mesh.points):
+            if self.conditions.remembers or lies_along(first.standing.model.mesh.points):
                 onward = self._along_lines(found, first.standing, left)
                 if onward is None:
                     return found
@@ -387,6 +390,10 @@ class Choices:
         lying = self._lying
         traced = lying.traced(start, lambda at: self.conditions.flat(at.fields), count)
         found.parts.append(Part(lying.curve(start), traced, lies=True))
+        notes = {True: (TURNS,), False: ()}
+        found.transitions += [Transition(*corner, notes[corner.turns]) for corner in traced.corners]
+        if self.conditions.remembers:
+            return None
         names = sorted({f"contacts.{p.contact}" for point in traced.points for p in point.model.mesh.points})
         if traced.end == "lost":
             found.parts[-1] = replace(found.parts[-1], traced=replace(traced, end="margin"))
@@ -466,6 +473,8 @@ class Choices:
 
         At a ``factor`` or, by default, across its tangent.
         """
+        if self.conditions.remembers:
+            return at
         if lies_along(at.model.mesh.points):
             return at if factor is None else self._lying.at_factor(at, factor)
         found: Standing | None = at
@@ -504,6 +513,8 @@ class Choices:
 
     def located(self, followed: Followed) -> Followed:
         """A path whose events and transitions are located where elements end where something acts then."""
+        if self.conditions.remembers:
+            return followed
         parts, transitions = list[Part](), list[Transition]()
         following = [*followed.parts[1:], followed.parts[-1]]
         for part, after, change in itertools.zip_longest(followed.parts, following, followed.transitions):
@@ -680,7 +691,7 @@ def _alike(a: Way, b: Way) -> bool:
 
 def _said(before: Standing, after: Standing, turns: bool) -> tuple[str, ...]:
     """What has to be known of a transition."""
-    notes: tuple[str, ...] = ("the factor turns there, at a corner",) if turns else ()
+    notes: tuple[str, ...] = (TURNS,) if turns else ()
     ways = [standing.inertia.negative for standing in (before, after)]
     if before.model.conservative and ways[0] != ways[1]:
         notes += (f"the number of unstable directions changes from {ways[0]} to {ways[1]}",)

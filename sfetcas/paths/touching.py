@@ -11,6 +11,7 @@ normal, which is right to first order.  A little farther on it slides.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -23,7 +24,7 @@ from ..contact.member_contact import MemberContact
 from ..contact.pairs import ONE, Near
 from ..description.records import enumerated
 from ..description.scene import Scene
-from ..equilibria.member_contact_steps import undeformed
+from ..equilibria.member_contact_steps import on_way, undeformed
 from ..equilibria.single import solved_from
 from ..equilibria.solution import Equilibrium
 from ..errors import LIMITS, SceneError, SolveError, Status
@@ -33,10 +34,11 @@ from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Mesh
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.beginning import begin_path, begun_at, beside_zero
-from ..solvers.prepared import Prepared
+from ..solvers.prepared import Prepared, Solved
 from ..solvers.redundancy import redundant
 from .conditions import NEAR, Begun, Choice, Conditions, Way
 from .lying import Lying, Piece
+from .rubbing import Rubbing
 
 __all__ = ["Touching"]
 
@@ -181,6 +183,11 @@ class Touching(Conditions[_At]):
 
     # -- begin ----------------------------------------------------------------------------------
 
+    @property
+    def remembers(self) -> bool:  # type: ignore[override]
+        """As of :class:`.Conditions`: with friction."""
+        return self.scene.rubs
+
     def begin(self, prepared: Callable[[Choice], Prepared], span: tuple[float, float], first: Choice) -> Begun:
         """As of :class:`.Conditions`: without contact if nothing penetrates then, else as statics finds it."""
         pilot = prepared(Choice())
@@ -188,6 +195,8 @@ class Touching(Conditions[_At]):
         self.run.redundant = redundant(pilot.equations, zero.point)
         self.made(pilot)
         self.run.refuse_penetrating(zero.fields)
+        if self.remembers:
+            return self._begun_by_steps(zero, span)
         try:
             found = begin_path(pilot, span)
         except SolveError as error:
@@ -221,6 +230,22 @@ class Touching(Conditions[_At]):
             detail = f"what touches at factor {factor:g} was not found on the mesh of the path"
             raise SolveError(Status.FAILED, detail, near.state)
         return begun_at(prepared(Choice.of(found.model.mesh)), found.state, factor, notes, span)
+
+    def _begun_by_steps(self, zero: Solved, span: tuple[float, float]) -> Begun:
+        """The first point of a path with friction: loads have grown from zero to those at the begin of the range."""
+        begin = float(np.clip(0.0, *span))
+        now = self.run.lying(zero)
+        ways = [lambda t: lambda model: model.loading(0.0, t)] if self.scene.histories else []
+        ways += [functools.partial(on_way, 0.0, begin)] if begin else []
+        for way in ways:
+            there = self.run.follow(way, now)
+            if there is None:
+                detail = (
+                    f"the loads with which the path begins were followed to {self.run.reached.part:.5g} of themselves"
+                )
+                raise SolveError(Status.FAILED, detail, now.state)
+            now = there
+        return begun_at(now.prepared, now.state, begin, (), span)
 
     # -- margins --------------------------------------------------------------------------------
 
@@ -525,7 +550,7 @@ class Touching(Conditions[_At]):
 
     def lying(self, mesh: Mesh, span: tuple[float, float], piece: Piece, finer: float) -> Lying:
         """As of :class:`.Conditions`."""
-        return Lying(self.run, mesh, span, piece, finer)
+        return (Rubbing if self.remembers else Lying)(self.run, mesh, span, piece, finer)
 
     def _new(self, one: _Touch) -> ContactPoint:
         """A place that begins to touch."""

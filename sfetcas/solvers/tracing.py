@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,11 +25,13 @@ from .residuals import relative_residual
 
 __all__ = [
     "FAR",
+    "FINE",
     "FIRST",
     "SHARE",
     "SHORTEST",
     "STRIDE",
     "TURNING",
+    "Corner",
     "Traced",
     "full_shape",
     "longest",
@@ -105,6 +108,24 @@ MEETING = 1e-3
 """Bifurcations on two curves are one within this, rad: rounding moves them along the shape that is open there."""
 
 
+class Corner(NamedTuple):
+    """A point at which a curve goes on in another direction.
+
+    Attributes
+    ----------
+    standing : Standing
+        The point, before it does.
+    changes : tuple of str
+        What happens, a sentence each.
+    turns : bool
+        Whether the factor turns there.
+    """
+
+    standing: Standing
+    changes: tuple[str, ...]
+    turns: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Traced:
     """A stretch of a curve.
@@ -117,7 +138,8 @@ class Traced:
     end : str
         Why it ends: ``range`` (the factor leaves it), ``points`` (as many as asked for), ``closed`` (the last point is
         the first one again), ``lost`` (no further point was found), ``bent`` (it is beyond what the scene
-        describes), or ``margin`` (one that is watched is zero at the last point).
+        describes), ``margin`` (one that is watched is zero at the last point), or ``away`` (beyond that it slides away
+        at the same factor).
     limit : SolveError or None
         Where it ends ``bent``: what is beyond its limits.
     near : tuple of float
@@ -126,6 +148,8 @@ class Traced:
         Where it ends ``margin``: which of the margins are zero there and below beyond it.
     missed : float
         What its steps together leave out of what members remember, rad, see :meth:`.Curve.missed`.
+    corners : list of Corner
+        Where what touches changes within it.
     """
 
     points: list[Standing]
@@ -135,6 +159,7 @@ class Traced:
     near: tuple[float, ...] = ()
     crossed: tuple[int, ...] = ()
     missed: float = 0.0
+    corners: Sequence[Corner] = ()
 
 
 def trace(
