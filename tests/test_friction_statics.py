@@ -431,3 +431,30 @@ def test_with_friction_a_place_at_an_end_goes_inwards_by_more_than_it_is_known(s
     grip = Grip(0.3, 1.0, ((1.0, 0.0, 0.0),), (0.0,) * 3, ((1.0, 0.0, 0.0),), ((1.0, 0.0, 0.0),), (0.0,) * 3, 0.0)
     assert own._freed(None, replace(plain, grip=grip), ()).slides == (slides,)
     assert own._freed(None, plain, ()).slides == (True,)
+
+
+def roof(half):
+    """Two beams that lean on each other with rigid ends, on a rough floor on which both feet slide outwards; or one."""
+    nodes = {"A": [-1, 0], "B": [0, 0.2], "C": [1, 0]}
+    supports = {"B": {"support": "slider", "direction": [0, 1]}} if half else {}
+    members = {"left": ["A", "B"]} if half else {"left": ["A", "B"], "right": ["B", "C"]}
+    return Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0}},
+            "nodes": {n: {"position": at} | supports.get(n, {}) for n, at in nodes.items() if n != "C" or not half},
+            "members": {name: {"nodes": ends, "section": "s"} for name, ends in members.items()},
+            "loads": {"w": {"type": "force", "node": "B", "value": [0, -0.5 if half else -1]}},
+            "contacts": {"floor": FLOOR | {"friction": 0.5}},
+            "analysis": {"accuracy": 1e-5, "steps": [0.5]},
+        }
+    )
+
+
+def test_what_slides_at_both_ends_goes_as_little_as_it_can():
+    """Nothing but friction holds the roof along the floor, and that is at its limit: it stays where it stands."""
+    whole, half = (solve(roof(one)).last for one in (False, True))
+    for node in ("A", "B"):
+        np.testing.assert_allclose(whole.position(node), half.position(node), atol=2e-5)
+    np.testing.assert_allclose(whole.position("C") * [-1, 1, 1], whole.position("A"), atol=1e-6)
+    assert whole.position("A")[0] < -1.001
+    np.testing.assert_allclose(whole.contacts["floor"]["friction"], [[0.125, 0, 0], [-0.125, 0, 0]], atol=1e-6)

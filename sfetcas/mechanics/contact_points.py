@@ -190,8 +190,8 @@ class RoughGap(Term):
     """Contact with friction at a point.
 
     Places: the vector, the forces, the places on the members.  Data: of the gap, the coefficient, how firm it is, how
-    much it yields, directions along, the vector of the last state less that where the search begins, tangents of the
-    members in the last state, and now.
+    much it yields and resists, directions along, the vector of the last state less that where the search begins,
+    tangents of the members in the last state, and now.
 
     Attributes
     ----------
@@ -225,7 +225,7 @@ class RoughGap(Term):
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """Its places; no rows."""
-        data = self.smooth.sizes[3] + 3 + self.axes * (self.axes + 2 * self.members)
+        data = self.smooth.sizes[3] + LAW + self.axes * (self.axes + 2 * self.members)
         return self.smooth.sizes[0], 2 + self.members, 0, data, 0
 
     def _law(
@@ -233,7 +233,7 @@ class RoughGap(Term):
     ) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
         """The slip less what it gives way by, the force that the law is for, its size, its limit, how firm it is."""
         first = self.smooth.sizes[3]
-        coefficient, firm, yields = ca.vertsplit(data[first : first + 3])
+        coefficient, firm, yields, _ = ca.vertsplit(data[first : first + LAW])
         slipped = slip + yields * friction
         way = friction - firm * slipped
         return slipped, way, ca.sqrt(ca.dot(way, way) + NOWHERE), coefficient * ca.fmax(u[1][0], 0.0), firm
@@ -242,7 +242,7 @@ class RoughGap(Term):
         """The gap, its normal, friction (axes,), the slip (axes,), and the tangents of the members, all as seen from
         the obstacle.
         """
-        n, own = self.axes, data[self.smooth.sizes[3] + 3 :]
+        n, own = self.axes, data[self.smooth.sizes[3] + LAW :]
         vectors = ca.vertsplit(own, n)
         frame, origin, tangents = vectors[: n - 1], vectors[n - 1], vectors[n:]
         vector = ca.SX.sym("vector", n)
@@ -260,20 +260,21 @@ class RoughGap(Term):
         """On the vector minus the force of the point; on the forces what they miss; along the members."""
         gap, normal, friction, slip, tangents = self._parts(q, u, data)
         first, n = self.smooth.sizes[3], self.axes
-        yields = data[first + 2]
-        frame = ca.vertsplit(data[first + 3 :], n)[: n - 1]
+        yields, resists = data[first + 2], data[first + 3]
+        frame = ca.vertsplit(data[first + LAW :], n)[: n - 1]
         # The nearest force to w that Coulomb's law allows.
         slipped, way, size, limit, firm = self._law(u, data, friction, slip)
         # What is new sticks: how hard it pushes is not known yet.
         held = ca.logic_or(size <= limit, firm <= 0.0)
         missing = []
         for share, along in zip(u[1][1:], frame, strict=True):
-            missing.append(ca.if_else(held, -ca.dot(slipped, along), share - limit * ca.dot(way, along) / size))
+            slides = share - limit * ca.dot(way, along) / size + resists * ca.dot(slip, along)
+            missing.append(ca.if_else(held, -ca.dot(slipped, along), slides))
         nothing = [ca.SX(0)] * (n - 1)
         pairs = zip(tangents, (1.0, -1.0), strict=False)
-        slides = [part for tangent, sign in pairs for part in (sign * ca.dot(friction, tangent), *nothing)]
+        places = [part for tangent, sign in pairs for part in (sign * ca.dot(friction, tangent), *nothing)]
         moments, force = self._on(q, u, data, u[1][0] * normal + friction)
-        return [*moments, *(-part for part in force), -gap - yields * u[1][0], *missing, *slides]
+        return [*moments, *(-part for part in force), -gap - yields * u[1][0], *missing, *places]
 
     def _on(self, q: list[Side], u: list[Side], data: ca.SX, force: ca.SX) -> tuple[Side, Side]:
         """What a force, as seen from the obstacle, takes from the rotation of its node, and the force (axes,)."""
@@ -295,6 +296,14 @@ class RoughGap(Term):
         forces = [u[1][0], *self._on(q, u, data, friction)[1], *nothing]
         return [*forces, *ca.vertsplit(slip), *nothing, size - limit]
 
+
+LAW = 4
+"""Numbers of the law of friction among the data."""
+
+RESISTS = 1e-9
+"""Force over slip, of the loads over the unit of length, that resists what slides beside friction: where a structure
+slides at all places, in several directions, it then does so by as little as it can.
+"""
 
 LEAST_YIELDING = 1e-13
 """How far what is rough gives way over the force, dimensionless, at least: rounding then does not decide how."""
@@ -389,7 +398,8 @@ def _held(parts: Parts, point: ContactPoint, gap: Gap, data: Array, begin: Array
     origin = (np.array(grip.origin) - begin)[:axes] / unit
     further = [np.array(one)[:axes] for one in (*grip.before, *grip.now)]
     frame = [np.array(one)[:axes] for one in grip.frame]
-    data = np.concatenate([data, [grip.coefficient, grip.firm * size, yields], *frame, origin, *further])
+    law = [grip.coefficient, grip.firm * size, yields, RESISTS * size]
+    data = np.concatenate([data, law, *frame, origin, *further])
     places = (between, segments.place(point.pressed), *slides)
     members = 0 if point.line else len(point.members)
     rough = RoughGap(parts.element.space, gap, members)
