@@ -128,7 +128,7 @@ def strip(friction, *, kind="path", end=1.0, accuracy=1e-6, **analysis):
         {
             "sections": {"s": {"EI3": 1.0}},
             "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [0, -1]}},
-            "members": {"strip": {"nodes": ["A", "B"], "section": "s"}},
+            "members": {"strip": {"nodes": ["A", "B"], "section": "s", "elements": 6}},
             "motions": {"drive": {"node": "A", "displacement": [0.5, 0]}},
             "contacts": {"bump": contact | ({"friction": friction} if friction else {})},
             "analysis": {"type": kind, "accuracy": accuracy, **analysis}

@@ -335,11 +335,22 @@ class MemberContact:
                 pushing, near = pressing or (numbered, source)
                 set_up = self.gripping.set_up(near.fields, mesh, pushing)
                 found = self._corrected(replace(mesh, points=set_up), near, way, since, drag)
-                if found is not None and (self.within is None or self.within(found)):
+                if found is not None and self._taken(found):
                     return found
             self.gripping.change()
         found = self._softly(mesh, numbered, source, way, since, drag) if self.scene.rubs and points else None
-        return found if found is None or self.within is None or self.within(found) else None
+        return found if found is not None and self._taken(found) else None
+
+    def _taken(self, found: Solved) -> bool:
+        """Whether an equilibrium is near enough, and nothing in it has slid so far that what resists that holds it."""
+        least = SLIPPED * found.model.scales.force
+        for point in found.model.mesh.points:
+            # What is new sticks, however hard that is.
+            if point.grip is not None and point.grip.firm > 0.0:
+                told = found.fields.contact_point(point)
+                if told["rubs"] > point.grip.coefficient * max(told["push"], 0.0) + least:
+                    return False
+        return self.within is None or self.within(found)
 
     def _pressing(
         self, mesh: Mesh, points: list[ContactPoint], source: Solved, way: Way, since: Solved | None, drag: float

@@ -300,7 +300,7 @@ class RoughGap(Term):
 LAW = 4
 """Numbers of the law of friction among the data."""
 
-RESISTS = 1e-9
+RESISTS = 1e-10
 """Force over slip, of the loads over the unit of length, that resists what slides beside friction: where a structure
 slides at all places, in several directions, it then does so by as little as it can.
 """

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .. import tolerances
 from ..contact.lines import on_line, points_of
 from ..contact.member_contact import STRIDE
 from ..contact.pairs import PairKey
@@ -43,9 +42,6 @@ slide is; and share of the way to where it is expected that is left out.
 
 AT_LIMIT = 1e-3
 """Share of the limit within which what sticks slides where no way leads on along the tangent."""
-
-HELD = 1e-11
-"""Stiffness, dimensionless, that holds what slides while it is looked for where to."""
 
 FARTHER = 2.0
 """How many times farther than its length a step may lead: where loads hardly change any more it would lead anywhere."""
@@ -235,11 +231,7 @@ class Rubbing(Lying):
         slides = [point for point in rough if fields.contact_point(point)["slides"]]
         if not slides:
             return None
-        # What nothing holds any more is held by next to nothing.
-        entries = equations.regularised(point.entries, tolerances.PROXIMAL * prepared.weight, tolerances.DUAL)
-        entries[equations.diagonal[list(self._moving(prepared).values())]] += HELD
-        equations.solver.factor(entries)
-        rate = equations.solver.solve(-curve.slope(state, at.factor, point)[:, None])[:, 0]
+        rate = curve.solved(point, -curve.slope(state, at.factor, point)[:, None])[:, 0]
         tangent = curve.normed(Tangent(rate, 1.0))
         state, factor = curve.predicted(replace(at, state=state, tangent=tangent), FINE)
         told = map(Fields(equations, state, curve.loading(factor)).contact_point, slides)
@@ -256,26 +248,20 @@ class Rubbing(Lying):
         kinds: list[object] | None = self._kinds(start)
         while (wall < np.inf or length >= SHORTEST) and len(points) - len(events) - len(corners) < count:
             if wall - base.arc <= LOCATED or (wall < np.inf and known[-1][1] <= SHARP):
-                at, there, away = self._beyond(base)
+                there, end = self._over(base, points, corners)
                 if there is None:
-                    return Traced([*points, at], events, "lost", corners=corners)
-                told, after = self._changes(base, there), self._kinds(there)
-                if told:
-                    turns = not away and bool(base.tangent.factor * there.tangent.factor < 0.0)
-                    corners.append(Corner(at, told, turns))
-                points += [at] if away else [at, there]
-                if away:
-                    return Traced(points, events, "away", corners=corners)
-                base, wall, length, known = there, np.inf, FIRST * self.finer, [(there.arc, self._margin(there))]
+                    return Traced(points, events, end, corners=corners)
                 # Whether what has just begun to touch sticks is seen farther on: it had moved before.
+                after = self._kinds(there)
                 kinds = None if kinds is None or len(after) > len(kinds) else after
+                base, wall, length, known = there, np.inf, FIRST * self.finer, [(there.arc, self._margin(there))]
                 continue
             length = min(length, longest(self.curve(base), base, longer))
             expected = _root(known) - base.arc
             if wall < np.inf:
                 room = wall - base.arc
                 length = (1.0 - SHORT) * expected if 0.0 < expected < room else 0.5 * room
-            there, end, changes = self._next_to(base, length, kinds)
+            there, stop, changes = self._next_to(base, length, kinds)
             if there is None:
                 if changes or wall < np.inf or length <= FINE or 0.0 <= expected < length:
                     wall = base.arc + length
@@ -293,14 +279,24 @@ class Rubbing(Lying):
                 points.append(events[-1].standing)
             base, kinds = there, self._kinds(there)
             known = [*known[-1:], (base.arc, self._margin(base))]
-            if wall == np.inf or end is not None:
+            if wall == np.inf or stop is not None:
                 points.append(base)
                 length *= float(np.clip(self.finer * TURNING / max(turned, TINY), 0.3, 2.0))
-            if end in self.span:
+            if stop in self.span:
                 return Traced(points, events, "range", corners=corners)
-            if end is not None:
+            if stop is not None:
                 base = points[-1] = self._beyond_knot(base)
         return Traced(points, events, "lost" if length < SHORTEST else "points", corners=corners)
+
+    def _over(self, base: Standing, points: list[Standing], corners: list[Corner]) -> tuple[Standing | None, str]:
+        """Add a corner, located from a point before it; the first point beyond it, or None and why the path ends."""
+        at, there, away = self._beyond(base)
+        told = () if there is None else self._changes(base, there)
+        if there is not None and told:
+            turns = not away and bool(base.tangent.factor * there.tangent.factor < 0.0)
+            corners.append(Corner(at, told, turns))
+        points += [at] if there is None or away else [at, there]
+        return (None, "away" if away else "lost") if there is None or away else (there, "")
 
     def _next_to(
         self, base: Standing, length: float, kinds: list[object] | None
