@@ -289,7 +289,8 @@ class Expect(Record):
     flutter_point : whole number
         Of a path: which flutter point, from 1.
     transition : whole number
-        Of a path: which transition, where tendons go slack or become taut and stops are reached or left, from 1.
+        Of a path: which transition, where tendons go slack or become taut, stops are reached or left, and members
+        touch, leave, stick or slide, from 1.
     """
 
     quantity: str
