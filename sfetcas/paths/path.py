@@ -70,8 +70,8 @@ class FlutterPoint(Equilibrium):
 
 @dataclass(frozen=True, eq=False)
 class TransitionPoint(Equilibrium):
-    """An equilibrium at which strings go slack or become taut, stops are reached or left, or members touch, leave, stick
-    or slide: the path has a corner.
+    """An equilibrium at which strings go slack or become taut, stops are reached or left, or members touch, leave,
+    stick or slide: the path has a corner.
 
     Attributes
     ----------
