@@ -258,3 +258,27 @@ def test_a_rod_that_lies_across_another_one_is_drawn_along_it():
     for one, other in zip(found.steps, steps.steps, strict=True):
         np.testing.assert_allclose(one.position("B"), other.position("B"), atol=1e-4)
         assert one.contacts["c"]["sticking"] == other.contacts["c"]["sticking"]
+
+
+@pytest.mark.parametrize("start", [0.0, 0.4])
+def test_a_bar_does_not_pass_a_wall_that_reaches_a_little_into_its_circle(start):
+    """By half a thousandth of its length: it stops there, whatever turns it."""
+    found = solve(
+        Scene.from_dict(
+            {
+                "nodes": {
+                    "O": {"position": [0, 0], "support": "hinge"},
+                    "T": {"position": [np.cos(start), np.sin(start)]},
+                },
+                "members": {"bar": {"nodes": ["O", "T"], "type": "rigid"}},
+                "springs": {"k": {"node": "O", "stiffness": 1.0}},
+                "loads": {"m": {"type": "moment", "node": "T", "value": 3.0}},
+                "contacts": {"wall": FLOOR | {"point": [0, 0.9995], "normal": [0, -1], "friction": 0.2}},
+                "analysis": path(1, accuracy=1e-5),
+            }
+        )
+    )
+    (touches,) = found.transitions
+    # It touches when it is in by a tenth of the accuracy, at a slope of 0.03 and for 3 N m.
+    assert touches.factor == pytest.approx((np.arcsin(0.9995) - start) / 3.0, abs=2e-5)
+    assert found.last.position("T")[1] == pytest.approx(0.9995, abs=1e-4)

@@ -115,9 +115,13 @@ class Rubbing(Lying):
         """As of :class:`.Lying`; with its tangent away from the point before."""
         self.run.within = functools.partial(self._within, now, length)
         try:
-            return self._leading(now, super().ahead(now, length, begins, fits))
+            there = super().ahead(now, length, begins, fits)
         finally:
             self.run.within = None
+        if there is not None and length > FINE and self.run.passing.bulged(now.fields, there.fields):
+            # What turns far does not pass what its tip meets on its arc.
+            return None
+        return self._leading(now, there)
 
     def _leading(self, now: Standing, there: Standing | None) -> Standing | None:
         """The second of two points with its tangent away from the first."""
