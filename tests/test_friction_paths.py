@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sfetcas import Scene, SceneError, Status, load, solve
+from sfetcas import Scene, SceneError, SolveError, Status, load, solve
 
 FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}
 FLOOR_MU, WALL_MU, LENGTH = 0.4, 0.3, 2.0
@@ -282,3 +282,24 @@ def test_a_bar_does_not_pass_a_wall_that_reaches_a_little_into_its_circle(start)
     # It touches when it is in by a tenth of the accuracy, at a slope of 0.03 and for 3 N m.
     assert touches.factor == pytest.approx((np.arcsin(0.9995) - start) / 3.0, abs=2e-5)
     assert found.last.position("T")[1] == pytest.approx(0.9995, abs=1e-4)
+
+
+def test_loads_that_rise_and_fall_leave_what_has_slipped_where_it_is():
+    """A history draws the block out, lets it go, and draws it again: as load steps, each factor once."""
+    history = {"t": [0, 1, 2, 3], "value": [0, 1, 0, 0.5]}
+    scene = block(10.0).replace({"histories.pull": history, "loads.pull.history": "pull"})
+    found = solve(scene.replace(analysis={"type": "path", "range": [0, 3], "steps": [0.5, 1, 1.5, 2, 3]}))
+    moved = [step.position("A")[0] for step in found.steps]
+    assert moved == pytest.approx([0.04, 0.14, 0.14, 0.06, 0.06], abs=1e-8)
+    verbs = [change.changes[0].split()[1] for change in found.transitions]
+    assert verbs == ["slides", "sticks", "slides", "sticks"]
+    assert [change.factor for change in found.transitions] == pytest.approx([0.3, 1.0, 1.6, 2.0], abs=1e-5)
+
+
+def test_what_slides_under_its_weight_alone_has_no_path():
+    slope = {"point": [0, 0], "normal": [-0.6, 0.8], "friction": 0.5}
+    scene = block().replace({"nodes.B.position": [0.8, 0.6], "contacts.floor": FLOOR | slope})
+    with pytest.raises(
+        SolveError, match=r"the path begins were followed to .*, where all that touches is about to slide"
+    ):
+        solve(scene)

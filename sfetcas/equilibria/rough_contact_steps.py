@@ -27,7 +27,7 @@ from .refinement import MOST_ELEMENTS
 from .single import finished, unjudged
 from .solution import Equilibrium, refuse_large
 
-__all__ = ["RoughContactSteps"]
+__all__ = ["RoughContactSteps", "lost_while"]
 
 LEVELS = 6
 """Sequences at most."""
@@ -137,17 +137,8 @@ class RoughContactSteps:
         """
         if found is not None:
             return found
-        last = run.reached
-        reached = begin + last.part * (end - begin)
-        fields, points = last.solved.fields, last.solved.model.mesh.points
-        told = [fields.contact_point(point) for point in points if point.grip is not None]
-        grips = [point.grip for point in points if point.grip is not None]
-        limits = [grip.coefficient * one["push"] for grip, one in zip(grips, told, strict=True)]
-        sizes = [one["rubs"] for one in told]
-        slides = bool(told) and all(size >= NEARLY * limit for size, limit in zip(sizes, limits, strict=True))
-        what = "where all that touches is about to slide" if slides else "and no further while members touch"
-        detail = f"the loads were followed to the factor {reached:.5g}, {what}"
-        raise SolveError(Status.FAILED, f"{detail}: {', '.join(f'contacts.{name}' for name in self.scene.contacts)}")
+        reached = begin + run.reached.part * (end - begin)
+        raise SolveError(Status.FAILED, f"the loads were followed to the factor {reached:.5g}, {lost_while(run)}")
 
     def _answer(self, found: Solved, error: float, notes: tuple[str, ...]) -> Equilibrium:
         refuse_large(found.fields)
@@ -161,3 +152,12 @@ class RoughContactSteps:
         )
         refuse_lost_forces(answer)
         return answer
+
+
+def lost_while(run: MemberContact) -> str:
+    """Where a way with friction was lost: whether all that touched was about to slide, and on what."""
+    last = run.reached.solved
+    grips = [(point.grip, last.fields.contact_point(point)) for point in last.model.mesh.points if point.grip]
+    slides = bool(grips) and all(told["rubs"] >= NEARLY * grip.coefficient * told["push"] for grip, told in grips)
+    what = "where all that touches is about to slide" if slides else "and no further while members touch"
+    return f"{what}: {', '.join(f'contacts.{name}' for name in run.scene.contacts)}"

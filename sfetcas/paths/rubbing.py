@@ -299,7 +299,8 @@ class Rubbing(Lying):
         if there is not None and told:
             turns = not away and bool(base.tangent.factor * there.tangent.factor < 0.0)
             corners.append(Corner(at, told, turns))
-        points += [at] if there is None or away else [at, there]
+        points += [at] if at is not points[-1] else []
+        points += [there] if there is not None and not away else []
         return (None, "away" if away else "lost") if there is None or away else (there, "")
 
     def _next_to(

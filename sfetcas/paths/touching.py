@@ -25,6 +25,7 @@ from ..contact.pairs import ONE, Near
 from ..description.records import enumerated
 from ..description.scene import Scene
 from ..equilibria.member_contact_steps import on_way, undeformed
+from ..equilibria.rough_contact_steps import lost_while
 from ..equilibria.single import solved_from
 from ..equilibria.solution import Equilibrium
 from ..errors import LIMITS, SceneError, SolveError, Status
@@ -240,9 +241,8 @@ class Touching(Conditions[_At]):
         for way in ways:
             there = self.run.follow(way, now)
             if there is None:
-                detail = (
-                    f"the loads with which the path begins were followed to {self.run.reached.part:.5g} of themselves"
-                )
+                how_far = f"to {self.run.reached.part:.3g} of themselves, {lost_while(self.run)}"
+                detail = f"the loads with which the path begins were followed {how_far}"
                 raise SolveError(Status.FAILED, detail, now.state)
             now = there
         return begun_at(now.prepared, now.state, begin, (), span)
