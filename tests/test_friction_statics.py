@@ -458,3 +458,40 @@ def test_what_slides_at_both_ends_goes_as_little_as_it_can():
     np.testing.assert_allclose(whole.position("C") * [-1, 1, 1], whole.position("A"), atol=1e-6)
     assert whole.position("A")[0] < -1.001
     np.testing.assert_allclose(whole.contacts["floor"]["friction"], [[0.125, 0, 0], [-0.125, 0, 0]], atol=1e-6)
+
+
+@pytest.mark.parametrize(("friction", "locks"), [(0.2, False), (0.6, True)])
+def test_what_friction_locks_is_not_driven_on(friction, locks):
+    """A strut that leans against a slide which is pushed towards it: beyond mu = tan(0.5) no force is enough."""
+    lean = 0.5
+    scene = Scene.from_dict(
+        {
+            "nodes": {
+                "H": {"position": [0, np.cos(lean)], "support": "hinge"},
+                "T": {"position": [np.sin(lean), 0]},
+                "P": {"position": [3, 0], "support": "slider", "direction": [1, 0]},
+            },
+            "members": {"strut": {"nodes": ["H", "T"], "type": "rigid"}},
+            "loads": {"w": {"type": "force", "node": "T", "value": [0, -1], "history": "always"}},
+            "histories": {"always": {"t": [0], "value": [1]}},
+            "motions": {"m": {"node": "P", "displacement": [-0.5, 0]}},
+            "contacts": {
+                "c": {
+                    "type": "plane",
+                    "point": [0, 0],
+                    "normal": [0, 1],
+                    "member": "strut",
+                    "node": "P",
+                    "friction": friction,
+                }
+            },
+            "analysis": {"steps": [1.0]},
+        }
+    )
+    if locks:
+        with pytest.raises(SolveError, match="to the factor 0, where friction locks what is driven on"):
+            solve(scene)
+    else:
+        force = solve(scene).last.contacts["c"]["force"]
+        # Moments about the hinge.
+        assert force[1] == pytest.approx(1.0 / (1.0 - friction / np.tan(lean)), rel=1e-6)

@@ -22,6 +22,7 @@ from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics.arrays import Array, Index, numbers, unit
 from ..mechanics.accuracy import roughness
+from ..mechanics.beams import load_size
 from ..mechanics.contact_points import undeformed_vectors
 from ..mechanics.equations import Point, State
 from ..mechanics.fields import Fields, transferred
@@ -58,6 +59,9 @@ members may then rise within a line.
 
 SOFTENED, LEAST_SOFTENED = 0.125, 1e-3
 """First and least step of the way on which what is rough ceases to give way, parts of it."""
+
+JAMMED = 1e-5
+"""How far what is rough may give way, over the size of the scene: under forces of some ten thousand times the loads."""
 
 SLIPPED = 1e-6
 """Share of the limit of friction from which on a place slides on, and by which length, dimensionless."""
@@ -199,6 +203,8 @@ class MemberContact:
         the near state on, and the equilibrium one across the direction, see :meth:`.Curve.corrected`.
     within : callable or None
         Whether an equilibrium is near enough to be the one that is looked for: with friction one may be far beyond.
+    jammed : bool
+        Whether in the last step something would have had to give way by much, as what friction locks.
     """
 
     def __init__(
@@ -221,6 +227,7 @@ class MemberContact:
         self.passing = Passing(scene, self.closest, self.edges, self.tolerance)
         self.across: Callable[[Prepared], tuple[Curve, Tangent]] | None = None
         self.within: Callable[[Solved], bool] | None = None
+        self.jammed = False
 
     def hold(self, fixed: Collection[str]) -> None:
         """Take the mesh of other members for prescribed."""
@@ -342,13 +349,18 @@ class MemberContact:
         return found if found is not None and self._taken(found) else None
 
     def _taken(self, found: Solved) -> bool:
-        """Whether an equilibrium is near enough, and nothing in it has slid so far that what resists that holds it."""
-        least = SLIPPED * found.model.scales.force
+        """Whether an equilibrium is near enough, and what is rough neither holds by what resists a slide nor gives way
+        by much: what is jammed between obstacles would.
+        """
+        scales, size = found.model.scales, self.scene.size
+        least, loads = SLIPPED * scales.force, max(load_size(self.scene, scales.length), scales.moment) / scales.length
         for point in found.model.mesh.points:
             # What is new sticks, however hard that is.
             if point.grip is not None and point.grip.firm > 0.0:
                 told = found.fields.contact_point(point)
-                if told["rubs"] > point.grip.coefficient * max(told["push"], 0.0) + least:
+                jams = point.grip.yields * scales.length * told["push"] > JAMMED * size * loads
+                self.jammed |= jams
+                if jams or told["rubs"] > point.grip.coefficient * max(told["push"], 0.0) + least:
                     return False
         return self.within is None or self.within(found)
 
@@ -888,7 +900,7 @@ class MemberContact:
                     left, there = now.part, self._fallen_from(mesh, now, part, way(part))
                     now, step = (now, step) if there is None else (_Step(part, there), self.first)
                     mesh = mesh if there is None else replace(there.model.mesh, points=())
-                elif there is None and step < SHORTEST * narrow / NARROW:
+                elif there is None and (step < SHORTEST * narrow / NARROW or (self.jammed and step < NARROW)):
                     return None
                 continue
             assert there is not None
@@ -917,7 +929,7 @@ class MemberContact:
         ``near`` is what is expected there, ``now`` by default.
         """
         near = near or now
-        self.gripping.since = now.fields
+        self.gripping.since, self.jammed = now.fields, False
         points = tuple(map(self.gripping.begun, points_of(near)))
         there = self.resolved(mesh, points, near, way)
         crossings = [] if there is None else self.passing.crossed(now.fields, there.fields)

@@ -160,4 +160,5 @@ def lost_while(run: MemberContact) -> str:
     grips = [(point.grip, last.fields.contact_point(point)) for point in last.model.mesh.points if point.grip]
     slides = bool(grips) and all(told["rubs"] >= NEARLY * grip.coefficient * told["push"] for grip, told in grips)
     what = "where all that touches is about to slide" if slides else "and no further while members touch"
+    what = "where friction locks what is driven on" if run.jammed else what
     return f"{what}: {', '.join(f'contacts.{name}' for name in run.scene.contacts)}"

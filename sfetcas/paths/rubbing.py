@@ -266,6 +266,8 @@ class Rubbing(Lying):
                 room = wall - base.arc
                 length = (1.0 - SHORT) * expected if 0.0 < expected < room else 0.5 * room
             there, stop, changes = self._next_to(base, length, kinds)
+            if there is None and self.run.jammed and length <= FINE:
+                return Traced(points, events, "lost", corners=corners)
             if there is None:
                 if changes or wall < np.inf or length <= FINE or 0.0 <= expected < length:
                     wall = base.arc + length
