@@ -303,3 +303,18 @@ def test_what_slides_under_its_weight_alone_has_no_path():
         SolveError, match=r"the path begins were followed to .*, where all that touches is about to slide"
     ):
         solve(scene)
+
+
+@pytest.mark.parametrize("values", [[0, 0.5, 1.0], [0, 0.9, 1.0]])
+def test_a_knot_while_something_slides_changes_nothing(values):
+    """The path comes to the end of the range, and to the knot, by itself: what slides there slides on."""
+    history = {"t": [0, 1, 2], "value": values}
+    scene = block(10.0).replace({"histories.pull": history, "loads.pull.history": "pull"})
+    found = solve(scene.replace(analysis={"type": "path", "range": [0, 2], "steps": [1, 2]}))
+    # What is pulled beyond 0.6 N goes into the spring.
+    assert [s.position("A")[0] for s in found.steps] == pytest.approx(
+        [max(2.0 * v - 0.6, 0.0) / 10.0 for v in values[1:]], abs=1e-8
+    )
+    assert len(found.transitions) == 1
+    assert not found.limit_points
+    assert found.status is Status.SOLVED

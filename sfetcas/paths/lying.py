@@ -275,5 +275,5 @@ class Lying:
             for factor in sorted(within, reverse=bool(b.factor < a.factor)):
                 found = self.at_factor(near(a, b, factor), factor)
                 met += [] if found is None else [found]
-            met += [b] if b.factor in factors else []
+            met += [b] if b.factor in factors and b.factor != a.factor else []
         return met

@@ -43,6 +43,9 @@ slide is; and share of the way to where it is expected that is left out.
 AT_LIMIT = 1e-3
 """Share of the limit within which what sticks slides where no way leads on along the tangent."""
 
+THERE = 1e-8
+"""Share of the unit of the factor that is no step to the end of the range, or to the knot of a history."""
+
 FARTHER = 2.0
 """How many times farther than its length a step may lead: where loads hardly change any more it would lead anywhere."""
 
@@ -280,10 +283,10 @@ class Rubbing(Lying):
             if max(abs(point.tangent.factor) for point in (base, there)) <= LEVEL * self.unit:
                 # What turns into the way along which it is drawn comes to slide away in the end.
                 return Traced([*points, there], events, "away", corners=corners)
-            if base.tangent.factor * there.tangent.factor < 0.0:
+            if stop is None and base.tangent.factor * there.tangent.factor < 0.0:
                 events.append(Event("limit", self._limit(base, there)))
                 points.append(events[-1].standing)
-            base, kinds = there, self._kinds(there)
+            base, kinds = there, self._kinds(there) if kinds is None else kinds
             known = [*known[-1:], (base.arc, self._margin(base))]
             if wall == np.inf or stop is not None:
                 points.append(base)
@@ -297,6 +300,15 @@ class Rubbing(Lying):
     def _over(self, base: Standing, points: list[Standing], corners: list[Corner]) -> tuple[Standing | None, str]:
         """Add a corner, located from a point before it; the first point beyond it, or None and why the path ends."""
         at, there, away = self._beyond(base)
+        stop = None if there is None or away else self._end(at, there)
+        if stop is not None:
+            # What happens there is told beyond it.
+            found = self.at_factor(at, stop)
+            points += [point for point in (at, found) if point is not None and point is not points[-1]]
+            if found is None or stop in self.span:
+                return None, "lost" if found is None else "range"
+            points[-1] = self._beyond_knot(found)
+            return points[-1], ""
         told = () if there is None else self._changes(base, there)
         if there is not None and told:
             turns = not away and bool(base.tangent.factor * there.tangent.factor < 0.0)
@@ -320,10 +332,15 @@ class Rubbing(Lying):
         if end is None:
             return there, None, False
         there = self.at_factor(base, end)
-        return (there, end, False) if there is not None and kinds in (None, self._kinds(there)) else (None, None, False)
+        # In a short step little tells what slides.
+        short = abs(end - base.factor) <= FINE * self.unit
+        same = there is not None and (short or kinds in (None, self._kinds(there)))
+        return (there, end, False) if same else (None, None, False)
 
     def at_factor(self, near: Standing, factor: float) -> Standing | None:
-        """As of :class:`.Lying`; with its tangent away from the point before."""
+        """As of :class:`.Lying`; with its tangent away from the point before, and itself where that is no step."""
+        if abs(factor - near.factor) <= THERE * self.unit:
+            return replace(near, loading=self.curve(near).loading(factor))
         return self._leading(near, super().at_factor(near, factor))
 
     def crossings(self, points: Sequence[Standing], factors: tuple[float, ...]) -> list[Standing]:
