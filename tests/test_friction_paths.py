@@ -318,3 +318,33 @@ def test_a_knot_while_something_slides_changes_nothing(values):
     assert len(found.transitions) == 1
     assert not found.limit_points
     assert found.status is Status.SOLVED
+
+
+def test_two_blocks_on_springs_stick_and_slide_back_one_after_the_other():
+    """A load that turns: friction of 0.4 and 0.8 N, springs of 10 and 5 N/m, 4 N drawn and let go."""
+    nodes = {"A": [0, 0], "B": [1, 0], "C": [2, 0], "D": [3, 0]}
+    always = {name: {"type": "force", "node": name, "value": [0, -1], "history": "always"} for name in nodes}
+    rough = {"one": 0.2, "two": 0.4}
+    spring = {"type": "translational", "node": "B", "to": "C", "stiffness": 5.0, "length": 1.0}
+    found = solve(
+        Scene.from_dict(
+            {
+                "nodes": {name: {"position": at} for name, at in nodes.items()},
+                "members": {
+                    "one": {"nodes": ["A", "B"], "type": "rigid"},
+                    "two": {"nodes": ["C", "D"], "type": "rigid"},
+                },
+                "springs": {"wall": {"type": "translational", "node": "A", "stiffness": 10.0}, "between": spring},
+                "loads": always | {"pull": {"type": "force", "node": "D", "value": [4, 0], "history": "pull"}},
+                "histories": {"always": {"t": [0], "value": [1]}, "pull": {"t": [0, 1, 2], "value": [0, 1, 0]}},
+                "contacts": {
+                    name: {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": name, "friction": mu}
+                    for name, mu in rough.items()
+                },
+                "analysis": {"type": "path", "range": [0, 2], "steps": [1, 1.5, 2], "accuracy": 1e-5},
+            }
+        )
+    )
+    assert [step.position("A")[0] for step in found.steps] == pytest.approx([0.28, 0.28, 0.12], abs=1e-7)
+    assert [step.position("C")[0] - 2.0 for step in found.steps] == pytest.approx([0.92, 0.84, 0.28], abs=1e-7)
+    assert [change.factor for change in found.transitions] == pytest.approx([0.2, 0.3, 1.0, 1.4, 1.6], abs=1e-5)

@@ -343,6 +343,12 @@ class Rubbing(Lying):
             return replace(near, loading=self.curve(near).loading(factor))
         return self._leading(near, super().at_factor(near, factor))
 
+    def _beyond_knot(self, at: Standing) -> Standing:
+        """As of :class:`.Lying`; loads may turn there, so that what slides sticks: only the factor goes on at first."""
+        return replace(
+            at, tangent=Tangent(np.zeros(at.equations.total), float(np.copysign(self.unit, at.tangent.factor)))
+        )
+
     def crossings(self, points: Sequence[Standing], factors: tuple[float, ...]) -> list[Standing]:
         """As of :class:`.Lying`: each from the point before it, of which it remembers what has slipped."""
         return self._crossings(points, factors, lambda a, b, factor: a)
