@@ -72,6 +72,14 @@ def test_the_same_answer_after_what_nobody_means(name):
     assert differences(scene, jittered(scene, 1), first) == []
 
 
+@pytest.mark.parametrize("seed", [0, 2])
+def test_a_ladder_stands_in_whatever_axes_and_units(seed):
+    """Newton's method may lead first to where it has slid down far and would stand again."""
+    analysis = {"accuracy": 1e-5, "steps": [0.1]}
+    scene = sfetcas.load("problems/ladder_pushed_down.toml").replace(analysis=analysis, expect=[])
+    assert differences(scene, jittered(scene, seed)) == []
+
+
 def test_twins_are_chosen_by_a_rule_and_told():
     """The start of the member that comes first in the alphabet turns towards +z, whatever the file's order is."""
     step = sfetcas.solve(pressed()).last

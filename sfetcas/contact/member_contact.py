@@ -22,8 +22,7 @@ from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics.arrays import Array, Index, numbers, unit
 from ..mechanics.accuracy import roughness
-from ..mechanics.beams import load_size
-from ..mechanics.contact_points import undeformed_vectors
+from ..mechanics.contact_points import loads_on, undeformed_vectors
 from ..mechanics.equations import Point, State
 from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
@@ -62,6 +61,11 @@ SOFTENED, LEAST_SOFTENED = 0.125, 1e-3
 
 JAMMED = 1e-5
 """How far what is rough may give way, over the size of the scene: under forces of some ten thousand times the loads."""
+
+SLIPS = 0.1
+"""Slip in a step, over the size, from which on a nearer state is looked for: a ladder stands, and would do so again
+where it has slid down far.
+"""
 
 SLIPPED = 1e-6
 """Share of the limit of friction from which on a place slides on, and by which length, dimensionless."""
@@ -332,7 +336,7 @@ class MemberContact:
         With ``drag`` rotations since another state are resisted, see :class:`~sfetcas.solvers.pseudo_transient.Drag`.
         """
         numbered = self.lines.set_out(mesh, points)
-        pressing = None
+        pressing, far = None, None
         for count, _ in enumerate(FIRM if self.scene.rubs and points else (1.0,)):
             # Another number seldom helps here, but where lines end.
             if self.lines.keys and (ends or not count):
@@ -343,24 +347,36 @@ class MemberContact:
                 set_up = self.gripping.set_up(near.fields, mesh, pushing)
                 found = self._corrected(replace(mesh, points=set_up), near, way, since, drag)
                 if found is not None and self._taken(found):
-                    return found
+                    if self._slipped(found) <= SLIPS:
+                        return found
+                    # Another number may lead to a state that is nearer.
+                    far = found if far is None else min(far, found, key=self._slipped)
             self.gripping.change()
+        if far is not None:
+            return far
         found = self._softly(mesh, numbered, source, way, since, drag) if self.scene.rubs and points else None
         return found if found is not None and self._taken(found) else None
+
+    def _slipped(self, found: Solved) -> float:
+        """How far places with friction have slipped since the last state of a way, over the size, at most."""
+        rough = (point for point in found.model.mesh.points if point.grip is not None)
+        slips = (float(np.linalg.norm(found.fields.contact_point(point)["slip"])) for point in rough)
+        return max(slips, default=0.0) / self.scene.size
 
     def _taken(self, found: Solved) -> bool:
         """Whether an equilibrium is near enough, and what is rough neither holds by what resists a slide nor gives way
         by much: what is jammed between obstacles would.
         """
-        scales, size = found.model.scales, self.scene.size
-        least, loads = SLIPPED * scales.force, max(load_size(self.scene, scales.length), scales.moment) / scales.length
+        scales = found.model.scales
         for point in found.model.mesh.points:
             # What is new sticks, however hard that is.
             if point.grip is not None and point.grip.firm > 0.0:
                 told = found.fields.contact_point(point)
-                jams = point.grip.yields * scales.length * told["push"] > JAMMED * size * loads
+                push = max(told["push"], 0.0)
+                gives = point.grip.yields * scales.length * push / (loads_on(self.scene, scales) * scales.force)
+                jams = gives > JAMMED * self.scene.size
                 self.jammed |= jams
-                if jams or told["rubs"] > point.grip.coefficient * max(told["push"], 0.0) + least:
+                if jams or told["rubs"] > point.grip.coefficient * push + SLIPPED * scales.force:
                     return False
         return self.within is None or self.within(found)
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..description.obstacles import Obstacle
 from ..mathematics.arrays import Array
 
-__all__ = ["NEXT_TO", "ONE", "SAME", "Near", "Pair", "PairKey", "penetrating"]
+__all__ = ["NEXT_TO", "ONE", "SAME", "Near", "Pair", "PairKey", "doing", "penetrating"]
 
 SAME = 0.5
 """Minima nearer to each other than this part of the distance of the centre lines are one, along both members."""
@@ -127,3 +127,13 @@ def penetrating(members: tuple[str, ...], at: Iterable[float], deep: float) -> s
     (a, b), (s, t) = members, at
     found = f"members {a!r} and {b!r} penetrate" if a != b else f"member {a!r} penetrates itself"
     return f"{found} by {deep:.3g} m at {s:.4g} and {t:.4g} of {'their lengths' if a != b else 'its length'}"
+
+
+def doing(contact: str, members: tuple[str, ...], at: Iterable[float], verb: str) -> str:
+    """What a place of a contact does, a sentence: ``contacts.peg touches beam at 0.5``; of two members
+    ``contacts.c: a at 0.2 touches b at 0.7``.
+    """
+    places = [f"{member} at {x:.4g}" for member, x in zip(members, at, strict=True)]
+    if len(places) == 1:
+        return f"contacts.{contact} {verb} {places[0]}"
+    return f"contacts.{contact}: {f' {verb} '.join(places)}"

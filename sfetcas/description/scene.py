@@ -1042,9 +1042,7 @@ def _check_points(scene: Scene) -> None:
     where, found = ("contacts", name), f"found {what}"
     if scene.analysis.type not in ("static", "modes", "path"):
         message = f"{found} with analysis.type = {scene.analysis.type!r}"
-        known = {"friction": "'static', where the order of steps is known, or 'dynamic'"}
-        accepted = known.get(what, "'static' or 'path'")
-        raise SceneError(f"{message}, accepted: with {accepted}", where)
+        raise SceneError(f"{message}, accepted: with 'static' or 'path'", where)
     for edge, stop in scene.obstacles.items():
         if stop.kind == "sharp" and scene.contacts[edge].friction > 0.0:
             raise SceneError("found friction on an edge, accepted: with 'member_radius', or none", ("contacts", edge))

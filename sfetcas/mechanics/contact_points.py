@@ -49,7 +49,7 @@ import numpy as np
 from ..description.contacts import contact_radius
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, numbers, unit
-from .beams import load_size
+from .beams import Scales, load_size
 from .contact_lines import Carrier, carrier_of, pressed_along, tangential_at
 from .mesh import ContactPoint
 from .parts import Parts
@@ -57,7 +57,7 @@ from .rings import GuidedTerm, guided
 from .segments import place_of_cut, standing
 from .terms import GROUND, One, Side, Term
 
-__all__ = ["Apart", "Gap", "Meeting", "contact_points_in", "undeformed_vectors"]
+__all__ = ["Apart", "Gap", "Meeting", "contact_points_in", "loads_on", "undeformed_vectors"]
 
 
 @final
@@ -326,6 +326,11 @@ def undeformed_vectors(scene: Scene, points: Sequence[ContactPoint]) -> list[Arr
     return vectors
 
 
+def loads_on(scene: Scene, scales: Scales) -> float:
+    """Size of the loads, dimensionless, at least one: what is rough gives way, and resists, by shares of it."""
+    return max(load_size(scene, scales.length) / scales.moment, 1.0)
+
+
 def _distance(scene: Scene, point: ContactPoint) -> Any:
     """The distance of a point as the scene says it, m: its radii may depend on parameters."""
     contact = scene.contacts[point.contact]
@@ -393,7 +398,7 @@ def _held(parts: Parts, point: ContactPoint, gap: Gap, data: Array, begin: Array
     if grip is None:
         place = (between,)
         return One(gap, point.name, carrier.node, numbers(data), carrier.turns, place, f"{point.name}, gap")
-    size = max(load_size(parts.scene, unit) / parts.scales.moment, 1.0)
+    size = loads_on(parts.scene, parts.scales)
     yields = max(grip.yields / size, LEAST_YIELDING)
     origin = (np.array(grip.origin) - begin)[:axes] / unit
     further = [np.array(one)[:axes] for one in (*grip.before, *grip.now)]

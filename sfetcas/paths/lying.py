@@ -257,23 +257,16 @@ class Lying:
 
     def crossings(self, points: Sequence[Standing], factors: tuple[float, ...]) -> list[Standing]:
         """The points at given factors, in their order along the path; one at the end of a range is as it is."""
-        return self._crossings(
-            points, factors, lambda a, b, factor: min(a, b, key=lambda one: abs(one.factor - factor))
-        )
-
-    def _crossings(
-        self,
-        points: Sequence[Standing],
-        factors: tuple[float, ...],
-        near: Callable[[Standing, Standing, float], Standing],
-    ) -> list[Standing]:
-        """As :meth:`crossings`, each found from one of the points between which it is."""
         met = [points[0]] if points[0].factor in factors else []
         for a, b in itertools.pairwise(points):
             low, high = min(a.factor, b.factor), max(a.factor, b.factor)
             within = [factor for factor in dict.fromkeys(factors) if low < factor < high]
             for factor in sorted(within, reverse=bool(b.factor < a.factor)):
-                found = self.at_factor(near(a, b, factor), factor)
+                found = self.at_factor(self._nearest(a, b, factor), factor)
                 met += [] if found is None else [found]
             met += [b] if b.factor in factors and b.factor != a.factor else []
         return met
+
+    def _nearest(self, a: Standing, b: Standing, factor: float) -> Standing:
+        """Which of two points one between them is found from."""
+        return min(a, b, key=lambda one: abs(one.factor - factor))

@@ -206,7 +206,7 @@ def _event_at(curve: Curve, path: Path, number: int) -> Event:
         curve.on(point.prepared or path.prepared).standing(point.state, point.factor, along) for point in points
     )
     if curve.inner(before.tangent, after.tangent) < 0.0:
-        after = replace(after, tangent=Tangent(-after.tangent.z, -after.tangent.factor))
+        after = replace(after, tangent=after.tangent.back)
     mean = Tangent(before.tangent.z + after.tangent.z, before.tangent.factor + after.tangent.factor)
     return Event("bifurcation", replace(at, tangent=curve.normed(mean)), max(1, at.inertia.zero))
 

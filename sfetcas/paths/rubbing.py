@@ -21,7 +21,7 @@ import numpy as np
 
 from ..contact.lines import on_line, points_of
 from ..contact.member_contact import STRIDE
-from ..contact.pairs import PairKey
+from ..contact.pairs import PairKey, doing
 from ..mathematics.arrays import TINY
 from ..mechanics.fields import Fields, transferred
 from ..mechanics.mesh import ContactPoint
@@ -78,10 +78,7 @@ class _Place:
         contact, members = self.pair
         if self.line:
             return f"contacts.{contact} {verb} {members[0]} all along its line"
-        places = [f"{member} at {x:.4g}" for member, x in zip(members, self.at, strict=True)]
-        if len(places) == 1:
-            return f"contacts.{contact} {verb} {places[0]}"
-        return f"contacts.{contact}: {places[0]} {verb} {places[1]}"
+        return doing(contact, members, self.at, verb)
 
 
 class Rubbing(Lying):
@@ -131,7 +128,7 @@ class Rubbing(Lying):
         if there is None:
             return None
         curve, apart = self._apart(now, there)
-        return there if curve.inner(apart, there.tangent) >= 0.0 else replace(there, tangent=_back(there.tangent))
+        return there if curve.inner(apart, there.tangent) >= 0.0 else replace(there, tangent=there.tangent.back)
 
     def _within(self, now: Standing, length: float, there: Solved) -> bool:
         """Whether a point is as near to another one as the end of a step of a length may be."""
@@ -238,12 +235,15 @@ class Rubbing(Lying):
         slides = [point for point in rough if fields.contact_point(point)["slides"]]
         if not slides:
             return None
-        rate = curve.solved(point, -curve.slope(state, at.factor, point)[:, None])[:, 0]
+        try:
+            rate = curve.solved(point, -curve.slope(state, at.factor, point)[:, None])[:, 0]
+        except np.linalg.LinAlgError:
+            return None
         tangent = curve.normed(Tangent(rate, 1.0))
         state, factor = curve.predicted(replace(at, state=state, tangent=tangent), FINE)
         told = map(Fields(equations, state, curve.loading(factor)).contact_point, slides)
         against = sum(float(one["slip"] @ one["friction"]) for one in told) <= 0.0
-        return tangent if against else _back(tangent)
+        return tangent if against else tangent.back
 
     # -- from point to point --------------------------------------------------------------------
 
@@ -349,14 +349,9 @@ class Rubbing(Lying):
             at, tangent=Tangent(np.zeros(at.equations.total), float(np.copysign(self.unit, at.tangent.factor)))
         )
 
-    def crossings(self, points: Sequence[Standing], factors: tuple[float, ...]) -> list[Standing]:
-        """As of :class:`.Lying`: each from the point before it, of which it remembers what has slipped."""
-        return self._crossings(points, factors, lambda a, b, factor: a)
-
-
-def _back(tangent: Tangent) -> Tangent:
-    """A tangent the other way along its curve."""
-    return replace(tangent, z=-tangent.z, factor=-tangent.factor)
+    def _nearest(self, a: Standing, b: Standing, factor: float) -> Standing:
+        """As of :class:`.Lying`: the point before it, of which it remembers what has slipped."""
+        return a
 
 
 def _root(known: Sequence[tuple[float, float]]) -> float:

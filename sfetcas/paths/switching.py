@@ -415,12 +415,12 @@ class Choices:
 
     def _begin_of(self, curve: Curve, there: Standing) -> tuple[Standing, tuple[int, ...]]:
         """Where the choice of a point begins to hold, and the margins that vanish there; the point if not found."""
-        back = replace(there, tangent=turned_back(there.tangent))
+        back = replace(there, tangent=there.tangent.back)
         traced = trace(curve, back, self.span, BACK, self.knots, self._watched, np.inf, self.conditions.passed)
         if traced.end != "margin":
             return there, ()
         at = traced.points[-1]
-        return replace(at, tangent=turned_back(at.tangent), arc=2.0 * there.arc - at.arc), traced.crossed
+        return replace(at, tangent=at.tangent.back, arc=2.0 * there.arc - at.arc), traced.crossed
 
     def _watched(self, standing: Standing) -> Array:
         """Margins (conditions,) of a point."""
@@ -669,11 +669,6 @@ class Choices:
             return f"no choice of {self.conditions.choosing} leads on: {names}"
         told = ["; ".join(self.conditions.told(one, way.choice) for one in near) for way in ways]
         return f"{len(ways)} ways lead on, and the path branches: {' or '.join(told)}"
-
-
-def turned_back(tangent: Tangent) -> Tangent:
-    """The tangent the other way along the curve."""
-    return replace(tangent, z=-tangent.z, factor=-tangent.factor)
 
 
 def _event_of(kind: str, curve: Curve, a: Standing, b: Standing) -> Event | None:

@@ -21,7 +21,7 @@ import numpy as np
 from .. import tolerances
 from ..contact.lines import LINE, lies_along, points_in, points_of
 from ..contact.member_contact import MemberContact
-from ..contact.pairs import ONE, Near
+from ..contact.pairs import ONE, Near, doing
 from ..description.records import enumerated
 from ..description.scene import Scene
 from ..equilibria.member_contact_steps import on_way, undeformed
@@ -86,10 +86,7 @@ class _At:
 
     def told(self, verb: str) -> str:
         """What it does in a sentence: ``contacts.peg touches beam at 0.5``."""
-        places = [f"{member} at {x:.4g}" for member, x in zip(self.members, self.at, strict=True)]
-        if len(places) == 1:
-            return f"contacts.{self.contact} {verb} {places[0]}"
-        return f"contacts.{self.contact}: {f' {verb} '.join(places)}"
+        return doing(self.contact, self.members, self.at, verb)
 
 
 @dataclass(frozen=True)

@@ -83,6 +83,11 @@ class Tangent:
     factor: float
     neutral: Neutral | None = None
 
+    @property
+    def back(self) -> Tangent:
+        """The direction the other way along the curve."""
+        return replace(self, z=-self.z, factor=-self.factor)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Standing(Solved):
@@ -297,7 +302,7 @@ class Curve:
             rate[first:] = way.lam
         found = self.normed(Tangent(rate, 1.0, neutral))
         doubtful = float(answer @ (self.prepared.weight * answer)) > DOUBT**2
-        return found if self.inner(found, along) >= 0.0 else replace(found, z=-found.z, factor=-found.factor), doubtful
+        return found if self.inner(found, along) >= 0.0 else found.back, doubtful
 
     @functools.cached_property
     def _probe(self) -> Array:
@@ -397,7 +402,7 @@ class Curve:
         way.z[: self._rotation_unknowns] = turned_between(self.equations, b.state, a.state, near=True)
         if self.inner(way, b.tangent) > 0.0:
             return b
-        return replace(b, tangent=replace(b.tangent, z=-b.tangent.z, factor=-b.tangent.factor))
+        return replace(b, tangent=b.tangent.back)
 
     # -- between two points ---------------------------------------------------------------------
 
