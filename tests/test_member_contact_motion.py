@@ -527,3 +527,34 @@ def test_events_tell_members_from_obstacles():
     assert "each other" in said["contacts.pair"]
     assert "each other" not in said["contacts.floor"]
     assert motion.to_dict()["events"][0]["between_members"] is True
+
+
+@pytest.mark.parametrize("integrator", ["radau-3", "stepping"])
+@pytest.mark.parametrize("members", [["left", "right", "bar"], ["bar", "right", "left"]])
+def test_a_bar_rests_on_the_common_node_of_two_members(interpreted, integrator, members):
+    """One touch with the whole weight, told of the first member of the contact that ends there."""
+    held = {"support": "clamped"}
+    nodes = {
+        "l": {"position": [-0.5, 0, 0], **held},
+        "m": {"position": [0, 0, 0], **held},
+        "r": {"position": [0.5, 0, 0], **held},
+        "b0": {"position": [0, -0.5, 2.0 * RADIUS], "support": "slider", "direction": [0, 0, 1]},
+        "b1": {"position": [0, 0.5, 2.0 * RADIUS]},
+    }
+    ends = {"left": ["l", "m"], "right": ["m", "r"], "bar": ["b0", "b1"]}
+    scene = {
+        "dimension": "space",
+        "gravity": [0.0, 0.0, -10.0],
+        "sections": {"rod": SECTION},
+        "nodes": nodes,
+        "members": {name: {"nodes": ends[name], "type": "rigid", "section": "rod"} for name in members},
+        "contacts": {"pair": {"type": "members", "members": members}},
+        "analysis": {"type": "dynamic", "end": 1e-3, "step": 5e-4, "integrator": integrator},
+    }
+    told = solve(Scene.from_dict(scene)).last.contacts["pair"]
+    beam = next(name for name in members if name != "bar")
+    assert sorted((told["member"], told["other"])) == sorted(("bar", beam))
+    sign = 1.0 if told["member"] == "bar" else -1.0
+    assert told["force"] == pytest.approx([0.0, 0.0, sign * 10.0 * MASS], rel=1e-9, abs=1e-9 * MASS)
+    assert told["at" if told["member"] == beam else "other_at"] == ends[beam].index("m")
+    assert told["gap"] == pytest.approx(0.0, abs=1e-9)

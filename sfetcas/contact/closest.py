@@ -28,7 +28,7 @@ from ..mechanics.tables import Tables
 from .nearby import ALIKE, ITERATIONS, Nearby, Places
 from .pairs import SAME, Near, Pair, PairKey
 
-__all__ = ["BEHIND_EDGE", "LIFTED", "Closest", "answers"]
+__all__ = ["BEHIND_EDGE", "LIFTED", "Closest", "answers", "first_there"]
 
 PIECES, COARSE = 4, 2
 """Straight pieces of an element at least, and how many times fewer and longer they are in a coarse search: chains then
@@ -225,7 +225,8 @@ class Closest:
         """Whether places on two members each are one as members end at the same nodes there, or are the same."""
         if one.contact != other.contact or len(one.at) < 2 or len(other.at) < 2:
             return False
-        width = SAME * min(self.pairs[one.pair].width, self.pairs[other.pair].width)
+        pairs = (self.pairs.get(place.pair) or self.pairs[place.contact, place.members[::-1]] for place in (one, other))
+        width = SAME * min(pair.width for pair in pairs)
 
         def same(i: int, k: int) -> bool:
             (a, x), (b, y) = (one.members[i], one.at[i]), (other.members[k], other.at[k])
@@ -508,9 +509,9 @@ def answers(fields: Fields, error: float | None = None) -> dict[str, dict[str, A
             lifted = min(LYING[1] if error is None else error, LIFTED) * scene.size
             entries = _stretches(fields, closest, points, entries, lifted)
         for entry in entries:
-            entry["member"], entry["at"] = _first(scene, contact, entry["member"], entry["at"])
+            entry["member"], entry["at"] = first_there(scene, contact, entry["member"], entry["at"])
             if contact.between_members:
-                entry["other"], entry["other_at"] = _first(scene, contact, entry["other"], entry["other_at"])
+                entry["other"], entry["other_at"] = first_there(scene, contact, entry["other"], entry["other_at"])
         found[name] = entries[0] if len(entries) == 1 else {key: [e[key] for e in entries] for key in entries[0]}
     return found
 
@@ -530,7 +531,7 @@ def _entry(fields: Fields, point: ContactPoint) -> dict[str, Any]:
     return {**entry, "gap": float(gap) - fields.model.scene.contacts[point.contact].member_radius}
 
 
-def _first(scene: Scene, contact: Contact, member: str, x: Any) -> tuple[str, Any]:
+def first_there(scene: Scene, contact: Contact, member: str, x: Any) -> tuple[str, Any]:
     """A place of a member; at a node that of the first member of a contact that ends there, stretches as they are."""
     if isinstance(x, list) or x not in (0.0, 1.0):
         return member, x

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,13 @@ from ..mathematics.arrays import Array
 from ..mechanics.clearances import Rows
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import Approach, Spot
-from .closest import Closest
+from .closest import Closest, first_there
+from .pairs import Near
 
 __all__ = ["pressed", "push_at"]
+
+Touch = tuple[Near, Array, Array, bool]
+"""Where members touch, the forces (3,) across and along the surfaces on the first one, N, and whether it sticks."""
 
 
 def push_at(fields: Fields, spot: Spot) -> Array:
@@ -30,40 +34,62 @@ def pressed(
 
     ``friction`` has, for approaches, the force (3,) of friction on the first member, N, and whether it sticks.
     """
-    model, found = fields.model, dict[str, dict[str, Any]]()
-    entries = sorted(_entries(fields, friction), key=lambda entry: (entry[0], entry[1]["member"], entry[1]["at"]))
-    closest = Closest(model.scene)
+    scene, found = fields.model.scene, dict[str, dict[str, Any]]()
+    closest = Closest(scene)
+    touches = _once_each(closest, _touches(fields, friction))
     for name in contacts:
-        own = [entry for contact, entry in entries if contact == name]
+        contact = scene.contacts[name]
+        own = list[dict[str, Any]]()
+        for near, across, along, sticks in touches:
+            if near.contact == name:
+                places = zip(near.members, near.at, strict=True)
+                (member, at), (other, other_at) = (first_there(scene, contact, *place) for place in places)
+                told = {"force": across + along, "at": at, "gap": near.gap, "member": member}
+                told |= {"friction": along, "sticking": sticks} if contact.friction else {}
+                own.append({**told, "other": other, "other_at": other_at})
         if not own:
             gap = closest.gap(fields, name)
             nothing = {"force": np.zeros(3), "at": None, "gap": gap, "member": None}
             found[name] = {**nothing, "other": None, "other_at": None}
-            if model.scene.contacts[name].friction:
+            if contact.friction:
                 found[name] |= {"friction": np.zeros(3), "sticking": None}
             continue
         found[name] = own[0] if len(own) == 1 else {key: [e[key] for e in own] for key in own[0]}
     return found
 
 
-def _entries(fields: Fields, friction: Mapping[str | Approach, tuple[Array, bool]]) -> list[tuple[str, dict[str, Any]]]:
-    """The contact and what is told of each place where members touch."""
-    model, found = fields.model, list[tuple[str, dict[str, Any]]]()
+def _touches(fields: Fields, friction: Mapping[str | Approach, tuple[Array, bool]]) -> list[Touch]:
+    """Where members touch, as approaches have it."""
+    model, found = fields.model, list[Touch]()
     number = {name: i for i, name in enumerate(model.row_names)}
     for rows in Rows.of(model.connections, model.mesh):
         places, _ = rows.located(fields.state.q, fields.displaced)
         for near, at in zip(rows.approaches, places, strict=True):
-            at_members = [_along(fields, near, side, float(at[side])) for side in (0, 1)]
+            one_at, other_at = (_along(fields, near, side, float(at[side])) for side in (0, 1))
             one, other = (
-                fields.positions(member, np.array([x]))[0] for member, x in zip(near.members, at_members, strict=True)
+                fields.positions(member, np.array([x]))[0]
+                for member, x in zip(near.members, (one_at, other_at), strict=True)
             )
             apart = float(np.linalg.norm(one - other))
-            force = -fields.state.lam[number[near.name]] * (one - other) / apart * model.scales.force
-            told = {"force": force, "at": at_members[0], "gap": apart - near.distance, "member": near.members[0]}
-            if model.scene.contacts[near.contact].friction:
-                along, sticks = friction.get(near, (np.zeros(3), False))
-                told |= {"force": force + along, "friction": along, "sticking": sticks}
-            found.append((near.contact, {**told, "other": near.members[1], "other_at": at_members[1]}))
+            normal = (one - other) / apart
+            across = -fields.state.lam[number[near.name]] * normal * model.scales.force
+            place = Near(near.contact, near.members, (one_at, other_at), normal, apart - near.distance, near.distance)
+            found.append((place, across, *friction.get(near, (np.zeros(3), False))))
+    return found
+
+
+def _once_each(closest: Closest, touches: Iterable[Touch]) -> list[Touch]:
+    """Touches by members and places; where members end at the same node, they are one, with the sum of their forces."""
+    found = list[Touch]()
+    for near, across, along, sticks in sorted(touches, key=lambda touch: (touch[0].pair, touch[0].at)):
+        same = next((i for i, touch in enumerate(found) if closest.one_place(near, touch[0])), None)
+        if same is None:
+            found.append((near, across, along, sticks))
+        else:
+            known, pushes, rubs, stuck = found[same]
+            # Where the first member of one is the second one of the other it feels the opposite.
+            sign = float(np.sign(near.normal @ known.normal))
+            found[same] = known, pushes + sign * across, rubs + sign * along, stuck and sticks
     return found
 
 
