@@ -90,7 +90,7 @@ def test_member_that_lies_is_clamped_where_it_does():
 
 
 def test_ends_of_lines_are_found_whatever_statics_left_of_them():
-    coarse, fine = sagging(0.05, 1e-4), sagging(0.05)
+    coarse, fine = sagging(0.05, 1e-3), sagging(0.05)
     assert abs(coarse.last.contacts["c"]["at"][0] - fine.last.contacts["c"]["at"][0]) > 1e-7
     assert coarse.omega == pytest.approx(fine.omega, rel=coarse.error_estimate + 1e-9)
     assert coarse.error_estimate < 1e-4

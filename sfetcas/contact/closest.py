@@ -17,7 +17,7 @@ from .. import tolerances
 from ..description.contacts import Contact, contact_radius, pairs_of
 from ..description.obstacles import edge_side, members_of, takes_part
 from ..description.scene import Scene
-from ..mathematics.arrays import TINY, Array
+from ..mathematics.arrays import TINY, Array, unit
 from ..mechanics.balance import three
 from ..mechanics.center_lines import Along, Curve, Lines
 from ..mechanics.fields import Fields
@@ -449,6 +449,12 @@ class Closest:
             own &= first < there
         places_of = zip(first[own].tolist(), there[own].tolist(), vectors[own], apart[own].tolist(), strict=True)
         return [Near(*pair.key, (s, t), v / max(a, TINY), a - pair.distance, pair.distance) for s, t, v, a in places_of]
+
+    def frozen(self, fields: Fields, point: ContactPoint) -> ContactPoint:
+        """A point between members that stays where it is, and pushes along what is across both there."""
+        one, other = (fields.positions(m, np.array([x]))[0] for m, x in zip(point.members, point.at, strict=True))
+        x, y, z = unit(one - other).tolist()
+        return replace(point, slides=(False, False), normal=(x, y, z), new=True)
 
     def alike(self, pair: PairKey, one: tuple[float, ...], other: tuple[float, ...], share: float = 1.0) -> bool:
         """Whether two places of a pair are as good as one, or so near as a share of that."""

@@ -92,6 +92,10 @@ to which a point is parted into their ends; ends of elements on so short a line 
 """
 
 
+PAIRED = 0.02
+"""Gap between members, over the size, up to which ends of elements on a line may begin to touch in one step."""
+
+
 class Lines:
     """The lines of a scene.
 
@@ -178,14 +182,21 @@ class Lines:
             for one in (self._laid(replace(p, grip=None, line=False)) if p.line and self.chosen(p.pair) else [p])
         )
 
-    def beside(self, mesh: Mesh, points: Sequence[ContactPoint], fields: Fields) -> list[ContactPoint]:
-        """Places near those on lines on obstacles, or inside, that are none of given points."""
+    def beside(
+        self, mesh: Mesh, points: Sequence[ContactPoint], fields: Fields, paired: bool = False
+    ) -> list[ContactPoint]:
+        """Places near those on lines on obstacles, or inside, that are none of given points; if ``paired`` also on
+        lines between members.
+        """
         found, known = list[ContactPoint](), {(p.pair, p.at, p.sides) for p in points}
         for key in sorted(self.keys):
             pair = self.closest.pairs[key]
-            if pair.stop is None:
-                continue
             cuts, own = mesh.cuts[pair.members[0]], [p.at[0] for p in points if p.pair == key]
+            if pair.stop is None:
+                if paired:
+                    near = self.closest.along(fields, pair, mesh, PAIRED * self.scene.size)
+                    found += [begun(one) for one in near if one.at[0] not in own]
+                continue
             ends = self._known_ends(mesh, points, key)
             near = {one.at[0]: one for one in self.closest.along(fields, pair, mesh, np.inf)}
             on = np.isin(cuts, own) | np.array([near[x].gap < 0.0 for x in cuts.tolist()])

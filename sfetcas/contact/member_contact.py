@@ -207,6 +207,8 @@ class MemberContact:
         the near state on, and the equilibrium one across the direction, see :meth:`.Curve.corrected`.
     within : callable or None
         Whether an equilibrium is near enough to be the one that is looked for: with friction one may be far beyond.
+    paired : bool
+        Whether it is found all at once, too, what pushes along lines between members.
     jammed : bool
         Whether in the last step something would have had to give way by much, as what friction locks.
     """
@@ -231,7 +233,7 @@ class MemberContact:
         self.passing = Passing(scene, self.closest, self.edges, self.tolerance)
         self.across: Callable[[Prepared], tuple[Curve, Tangent]] | None = None
         self.within: Callable[[Solved], bool] | None = None
-        self.jammed = False
+        self.jammed = self.paired = False
 
     def hold(self, fixed: Collection[str]) -> None:
         """Take the mesh of other members for prescribed."""
@@ -384,12 +386,18 @@ class MemberContact:
         self, mesh: Mesh, points: list[ContactPoint], source: Solved, way: Way, since: Solved | None, drag: float
     ) -> tuple[list[ContactPoint], Solved] | None:
         """Those of given points, and of those beside them on lines, that push, and where; None if none is found."""
-        every = self.lines.set_out(mesh, [*points, *self.lines.beside(mesh, points, source.fields)])
+        every = self.lines.set_out(mesh, [*points, *self.lines.beside(mesh, points, source.fields, self.paired)])
         free = [i for i, point in enumerate(every) if len(point.members) == 1 and not any(point.slides)]
-        if not free:
+        on_lines = [len(point.members) == 2 and point.pair in self.lines.keys for point in every]
+        paired = np.flatnonzero(on_lines).tolist() if self.paired else []
+        if not free and not paired:
             return points, source
         for i in free:
             every[i] = self._known(every[i])
+        for i in paired:
+            # Where it does not push nothing would say where it slides to.
+            every[i] = self.closest.frozen(source.fields, every[i])
+        free += paired
         every = list(self.gripping.set_up(source.fields, mesh, every))
         prepared = self.prepare(replace(mesh, points=tuple(every)))
         prepared.equations.redundant = False
@@ -416,7 +424,11 @@ class MemberContact:
         idle = {i for i, pushed in zip(free, system.pushed(found.state).tolist(), strict=True) if not pushed}
         pressed = Solved(prepared, **found._asdict())
         # Where those that slide are now: from there their pushes go on.
-        kept = [point for i, point in enumerate(points_of(pressed)) if i not in idle]
+        kept = [
+            self._freed(pressed.fields, point, ()) if i in paired else point
+            for i, point in enumerate(points_of(pressed))
+            if i not in idle
+        ]
         return self.lines.set_out(mesh, kept), pressed
 
     def _by_newton(self, system: OneSided, state: State, factor: float) -> Converged:
@@ -636,6 +648,11 @@ class MemberContact:
             lined = self.lines.parallel(source, mesh)
             found = None if lined is None else self._resolved(*lined, source, way, drag, False)
         between = frozenset(key for key in lines if len(key[1]) == 2)
+        if found is None and between:
+            # Places that come and go one by one, and go round, are found all at once where they stay meanwhile.
+            self.lines.keys, self.paired = lines, True
+            found = self._resolved(mesh, points, source, way, drag, False)
+            self.paired = False
         if found is None and between:
             # Members that bend away from each other touch at places that slide again.
             self.lines.keys = lines - between
