@@ -380,6 +380,17 @@ def test_members_at_random_that_were_refused(kind, seed, forces):
     assert sum(np.linalg.norm(force) > 0.0 for force in np.reshape(step.contacts["c"]["force"], (-1, 3))) >= forces
 
 
+@pytest.mark.parametrize(("seed", "accuracy"), [(205, 1e-4), (309, 1e-5)])
+def test_beams_that_press_each_other_along_their_length_sag_together(seed, accuracy):
+    """Places that come and go a few at a time go round here: it is found all at once which of them push."""
+    table = member_scene("parallel", seed)
+    step = solve(Scene.from_dict({**table, "analysis": {**table["analysis"], "accuracy": accuracy}})).last
+    assert step.notes == ()
+    assert step.certificate.stable is True
+    assert wrong_contacts(step) == []
+    assert np.linalg.norm(step.contacts["c"]["force"], axis=1).max() > 1.0
+
+
 def test_a_hinge_between_two_members_is_pushed_once():
     """The node is the end of one and the beginning of the other: it touches at one place, and all balances."""
     step = solve(Scene.from_dict(member_scene("hinged", 0))).last

@@ -194,8 +194,8 @@ class Lines:
             cuts, own = mesh.cuts[pair.members[0]], [p.at[0] for p in points if p.pair == key]
             if pair.stop is None:
                 if paired:
-                    near = self.closest.along(fields, pair, mesh, PAIRED * self.scene.size)
-                    found += [begun(one) for one in near if one.at[0] not in own]
+                    about = self.closest.along(fields, pair, mesh, PAIRED * self.scene.size)
+                    found += [begun(one) for one in about if one.at[0] not in own]
                 continue
             ends = self._known_ends(mesh, points, key)
             near = {one.at[0]: one for one in self.closest.along(fields, pair, mesh, np.inf)}

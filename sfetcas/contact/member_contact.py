@@ -648,8 +648,8 @@ class MemberContact:
             lined = self.lines.parallel(source, mesh)
             found = None if lined is None else self._resolved(*lined, source, way, drag, False)
         between = frozenset(key for key in lines if len(key[1]) == 2)
-        if found is None and between:
-            # Places that come and go one by one, and go round, are found all at once where they stay meanwhile.
+        if found is None and between and not self.scene.rubs:
+            # Where places that come and go a few at a time go round it is found all at once what pushes.
             self.lines.keys, self.paired = lines, True
             found = self._resolved(mesh, points, source, way, drag, False)
             self.paired = False
