@@ -530,7 +530,7 @@ def test_events_tell_members_from_obstacles():
 
 
 @pytest.mark.parametrize("integrator", ["radau-3", "stepping"])
-@pytest.mark.parametrize("members", [["left", "right", "bar"], ["bar", "right", "left"]])
+@pytest.mark.parametrize("members", [["left", "right", "bar"], ["bar", "right", "left"], ["left", "bar", "right"]])
 def test_a_bar_rests_on_the_common_node_of_two_members(interpreted, integrator, members):
     """One touch with the whole weight, told of the first member of the contact that ends there."""
     held = {"support": "clamped"}

@@ -17,7 +17,7 @@ from .. import tolerances
 from ..description.contacts import Contact, contact_radius, pairs_of
 from ..description.obstacles import edge_side, members_of, takes_part
 from ..description.scene import Scene
-from ..mathematics.arrays import TINY, Array, unit
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.balance import three
 from ..mechanics.center_lines import Along, Curve, Lines
 from ..mechanics.fields import Fields
@@ -205,12 +205,21 @@ class Closest:
         kept, at_node = dict[PairKey, list[Near]](), dict[tuple[str, str], list[Near]]()
         for near in found:
             known = kept.setdefault(near.pair, [])
-            ends = [at_node.setdefault((near.contact, node), []) for node in self.nodes(near)]
             same = any(self.alike(near.pair, near.at, other.at) for other in known)
-            if not same and not any(self.one_place(near, other) for own in ends for other in own):
-                for own in (known, *ends):
-                    own.append(near)
+            if not same and self.known_at_node(near, at_node) is None:
+                known.append(near)
         return [near for known in kept.values() for near in known]
+
+    def known_at_node(self, near: Near, at_node: dict[tuple[str, str], list[Near]]) -> Near | None:
+        """Of places by contact and node the one that a place is, too, as members end there; None where there is none,
+        and then it is entered.
+        """
+        ends = [at_node.setdefault((near.contact, node), []) for node in self.nodes(near)]
+        same = next((other for own in ends for other in own if self.one_place(near, other)), None)
+        if same is None:
+            for own in ends:
+                own.append(near)
+        return same
 
     def nodes(self, one: ContactPoint | Near) -> list[str]:
         """The nodes at which a place is."""
@@ -449,12 +458,6 @@ class Closest:
             own &= first < there
         places_of = zip(first[own].tolist(), there[own].tolist(), vectors[own], apart[own].tolist(), strict=True)
         return [Near(*pair.key, (s, t), v / max(a, TINY), a - pair.distance, pair.distance) for s, t, v, a in places_of]
-
-    def frozen(self, fields: Fields, point: ContactPoint) -> ContactPoint:
-        """A point between members that stays where it is, and pushes along what is across both there."""
-        one, other = (fields.positions(m, np.array([x]))[0] for m, x in zip(point.members, point.at, strict=True))
-        x, y, z = unit(one - other).tolist()
-        return replace(point, slides=(False, False), normal=(x, y, z), new=True)
 
     def alike(self, pair: PairKey, one: tuple[float, ...], other: tuple[float, ...], share: float = 1.0) -> bool:
         """Whether two places of a pair are as good as one, or so near as a share of that."""

@@ -92,7 +92,7 @@ to which a point is parted into their ends; ends of elements on so short a line 
 """
 
 
-PAIRED = 0.02
+REACH = 0.02
 """Gap between members, over the size, up to which ends of elements on a line may begin to touch in one step."""
 
 
@@ -183,18 +183,18 @@ class Lines:
         )
 
     def beside(
-        self, mesh: Mesh, points: Sequence[ContactPoint], fields: Fields, paired: bool = False
+        self, mesh: Mesh, points: Sequence[ContactPoint], fields: Fields, between: bool = False
     ) -> list[ContactPoint]:
-        """Places near those on lines on obstacles, or inside, that are none of given points; if ``paired`` also on
-        lines between members.
+        """Places near those on lines on obstacles, or inside, that are none of given points; with ``between`` those on
+        lines between members, too.
         """
         found, known = list[ContactPoint](), {(p.pair, p.at, p.sides) for p in points}
         for key in sorted(self.keys):
             pair = self.closest.pairs[key]
             cuts, own = mesh.cuts[pair.members[0]], [p.at[0] for p in points if p.pair == key]
             if pair.stop is None:
-                if paired:
-                    about = self.closest.along(fields, pair, mesh, PAIRED * self.scene.size)
+                if between:
+                    about = self.closest.along(fields, pair, mesh, REACH * self.scene.size)
                     found += [begun(one) for one in about if one.at[0] not in own]
                 continue
             ends = self._known_ends(mesh, points, key)

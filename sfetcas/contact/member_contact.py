@@ -207,7 +207,7 @@ class MemberContact:
         the near state on, and the equilibrium one across the direction, see :meth:`.Curve.corrected`.
     within : callable or None
         Whether an equilibrium is near enough to be the one that is looked for: with friction one may be far beyond.
-    paired : bool
+    at_once : bool
         Whether it is found all at once, too, what pushes along lines between members.
     jammed : bool
         Whether in the last step something would have had to give way by much, as what friction locks.
@@ -233,7 +233,7 @@ class MemberContact:
         self.passing = Passing(scene, self.closest, self.edges, self.tolerance)
         self.across: Callable[[Prepared], tuple[Curve, Tangent]] | None = None
         self.within: Callable[[Solved], bool] | None = None
-        self.jammed = self.paired = False
+        self.jammed = self.at_once = False
 
     def hold(self, fixed: Collection[str]) -> None:
         """Take the mesh of other members for prescribed."""
@@ -386,18 +386,13 @@ class MemberContact:
         self, mesh: Mesh, points: list[ContactPoint], source: Solved, way: Way, since: Solved | None, drag: float
     ) -> tuple[list[ContactPoint], Solved] | None:
         """Those of given points, and of those beside them on lines, that push, and where; None if none is found."""
-        every = self.lines.set_out(mesh, [*points, *self.lines.beside(mesh, points, source.fields, self.paired)])
-        free = [i for i, point in enumerate(every) if len(point.members) == 1 and not any(point.slides)]
-        on_lines = [len(point.members) == 2 and point.pair in self.lines.keys for point in every]
-        paired = np.flatnonzero(on_lines).tolist() if self.paired else []
-        if not free and not paired:
+        every = self.lines.set_out(mesh, [*points, *self.lines.beside(mesh, points, source.fields, self.at_once)])
+        on_lines = [self.at_once and point.pair in self.lines.keys for point in every]
+        free = [i for i, p in enumerate(every) if (not any(p.slides) if len(p.members) == 1 else on_lines[i])]
+        if not free:
             return points, source
         for i in free:
-            every[i] = self._known(every[i])
-        for i in paired:
-            # Where it does not push nothing would say where it slides to.
-            every[i] = self.closest.frozen(source.fields, every[i])
-        free += paired
+            every[i] = self._known(source.fields, every[i])
         every = list(self.gripping.set_up(source.fields, mesh, every))
         prepared = self.prepare(replace(mesh, points=tuple(every)))
         prepared.equations.redundant = False
@@ -425,7 +420,7 @@ class MemberContact:
         pressed = Solved(prepared, **found._asdict())
         # Where those that slide are now: from there their pushes go on.
         kept = [
-            self._freed(pressed.fields, point, ()) if i in paired else point
+            self._freed(pressed.fields, point, ()) if len(point.members) == 2 and i in free else point
             for i, point in enumerate(points_of(pressed))
             if i not in idle
         ]
@@ -456,8 +451,14 @@ class MemberContact:
         found = [first + i for i, (place, *way) in enumerate(names) if place in places and way != ["across"]]
         return np.array(found, np.intp)
 
-    def _known(self, point: ContactPoint) -> ContactPoint:
-        """A point that stays where it is, the gap of which is measured where it is now."""
+    def _known(self, fields: Fields, point: ContactPoint) -> ContactPoint:
+        """A point that stays where it is, the gap of which is measured where it is now; between members, across both,
+        as nothing says where a place slides to that does not push.
+        """
+        if len(point.members) == 2:
+            one, other = (fields.positions(m, np.array([x]))[0] for m, x in zip(point.members, point.at, strict=True))
+            x, y, z = unit(one - other).tolist()
+            return replace(point, slides=(False, False), normal=(x, y, z), new=True)
         return point if point.edge else replace(point, normal=self.closest.pairs[point.pair].normal, new=False)
 
     def _softly(
@@ -650,9 +651,11 @@ class MemberContact:
         between = frozenset(key for key in lines if len(key[1]) == 2)
         if found is None and between and not self.scene.rubs:
             # Where places that come and go a few at a time go round it is found all at once what pushes.
-            self.lines.keys, self.paired = lines, True
-            found = self._resolved(mesh, points, source, way, drag, False)
-            self.paired = False
+            self.lines.keys, self.at_once = lines, True
+            try:
+                found = self._resolved(mesh, points, source, way, drag, False)
+            finally:
+                self.at_once = False
         if found is None and between:
             # Members that bend away from each other touch at places that slide again.
             self.lines.keys = lines - between

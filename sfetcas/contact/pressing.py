@@ -80,17 +80,18 @@ def _touches(fields: Fields, friction: Mapping[str | Approach, tuple[Array, bool
 
 def _once_each(closest: Closest, touches: Iterable[Touch]) -> list[Touch]:
     """Touches by members and places; where members end at the same node, they are one, with the sum of their forces."""
-    found = list[Touch]()
-    for near, across, along, sticks in sorted(touches, key=lambda touch: (touch[0].pair, touch[0].at)):
-        same = next((i for i, touch in enumerate(found) if closest.one_place(near, touch[0])), None)
+    found, at_node = dict[int, Touch](), dict[tuple[str, str], list[Near]]()
+    # Few touch at nodes: all the others are looked at once.
+    for near, across, along, sticks in sorted(touches, key=lambda one: (one[0].contact, one[0].members[0], one[0].at)):
+        same = closest.known_at_node(near, at_node)
         if same is None:
-            found.append((near, across, along, sticks))
+            found[id(near)] = near, across, along, sticks
         else:
-            known, pushes, rubs, stuck = found[same]
+            known, pushes, rubs, stuck = found[id(same)]
             # Where the first member of one is the second one of the other it feels the opposite.
             sign = float(np.sign(near.normal @ known.normal))
-            found[same] = known, pushes + sign * across, rubs + sign * along, stuck and sticks
-    return found
+            found[id(same)] = known, pushes + sign * across, rubs + sign * along, stuck and sticks
+    return list(found.values())
 
 
 def _along(fields: Fields, near: Approach, side: int, at: float) -> float:
