@@ -457,6 +457,30 @@ def test_a_chain_pushed_together_buckles_to_the_side_of_its_load(force):
     assert np.sign(force) * step.position("c")[1] > 0.4
 
 
+@pytest.mark.parametrize("steps", [[0.01, 0.05, 0.1], [0.05], [1e-5]], ids=str)
+def test_a_column_shortened_under_a_load_across_bends_to_its_side_at_any_step(steps):
+    """Where closing takes away most of the bend of the start guess, that had short waves to the other side."""
+    scene = sfetcas.Scene.from_dict(
+        {
+            "sections": {"strip": {"EI3": 1.0}},
+            "nodes": {
+                "A": {"position": [0, 0], "support": "hinge"},
+                "B": {"position": [1, 0], "support": "slider", "direction": [1, 0], "rotation": "hinge"},
+            },
+            "members": {"strip": {"nodes": ["A", "B"], "section": "strip"}},
+            "motions": {"shorter": {"node": "B", "displacement": [-0.12, 0]}},
+            "loads": {"up": {"type": "force", "member": "strip", "at": 0.4, "value": [0, 1]}},
+            "analysis": {"steps": steps},
+        }
+    )
+    for up in (1.0, -1.0):
+        load = scene.loads["up"].model_copy(update={"value": (0.0, up, 0.0)})
+        for step in solve(scene.model_copy(update={"loads": {"up": load}})).steps:
+            assert np.sign(step.along("strip", [0.5])["position"][0, 1]) == up
+            # The load takes a part of the push that bends to its side.
+            assert step.reaction("A")[0][0] < np.pi**2 * (1.0 + 0.12 * step.factor)
+
+
 def test_a_stiff_tip_turns_with_the_soft_root_it_stands_on():
     nodes = {
         "a": sfetcas.Node(position=[0, 0], support="clamped"),

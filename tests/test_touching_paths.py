@@ -347,6 +347,26 @@ def test_a_line_begins_and_grows_on_a_floor():
         assert step.certificate.stable is True
 
 
+def test_what_is_beyond_the_last_place_that_presses_lies_without_a_force():
+    """The tip of a strip that is pushed against a wall turns up until it lies along it: from there nothing bends it."""
+    table = {
+        "sections": {"strip": {"EI3": 1.0}},
+        "nodes": {"base": {"position": [0, 0], "support": "clamped"}, "tip": {"position": [0.98, 0.15]}},
+        "members": {"strip": {"nodes": ["base", "tip"], "section": "strip"}},
+        "motions": {"push": {"node": "base", "displacement": [1.2, 0]}},
+        "contacts": {"wall": {"type": "plane", "point": [1, 0], "normal": [-1, 0], "member": "strip"}},
+    }
+    path = path_of(table, [0, 0.54], steps=[0.52, 0.54], accuracy=1e-3)
+    assert path.status is Status.SOLVED
+    assert path.points[-1].factor == pytest.approx(0.54)
+    assert told(path) == ["contacts.wall touches strip at 1", "strip begins to lie along contacts.wall"]
+    for step in path.steps:
+        alone = at(table, step.factor)
+        # The push is that of the accuracy asked for.
+        assert step.reaction("base")[0] == pytest.approx(alone.reaction("base")[0], abs=2e-3)
+        assert step.along("strip", np.linspace(0.97, 1.0, 7))["position"][:, 0] == pytest.approx(1.0, abs=1e-6)
+
+
 def test_a_column_between_walls():
     """Buckled against a wall, it begins to lie along it at four times Euler's load (Domokos, Holmes, Royce 1997)."""
     euler, scene = np.pi**2, load("problems/column_between_walls.toml")

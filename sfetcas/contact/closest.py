@@ -362,11 +362,14 @@ class Closest:
         x = np.linspace(begin, end, SAMPLES + 2)[1:-1]
         return bool(np.abs(self._gaps(fields, self.pairs[pair], x)[0]).max() < max(self.lying, lifted))
 
-    def lies_up_to(self, fields: Fields, pair: PairKey, begin: float, end: float) -> bool:
-        """Whether a member lies on an obstacle from a place where it touches up to an end of it: it does not turn."""
+    def lies_up_to(self, fields: Fields, pair: PairKey, begin: float, end: float, lifted: float = 0.0) -> bool:
+        """Whether a member lies on an obstacle from a place where it touches up to an end of it: it does not turn.
+
+        ``lifted`` as of :meth:`lies`.
+        """
         slope, _ = self._slopes(fields, self.pairs[pair], np.array([end]))
-        level = abs(float(slope[0])) * self.scene.size < self.lying
-        return level and self.lies(fields, pair, min(begin, end), max(begin, end))
+        level = abs(float(slope[0])) * self.scene.size < max(self.lying, lifted)
+        return level and self.lies(fields, pair, min(begin, end), max(begin, end), lifted)
 
     def gap_at(self, fields: Fields, pair: PairKey, at: float) -> float:
         """Gap, m, between a place of a member and an obstacle."""

@@ -211,11 +211,22 @@ class Lying:
                 return Traced(points, events, "range")
             if end is not None:
                 points[-1] = self._beyond_knot(there)
-            if not lies_along(points_of(there)) and not flat(there):
+            if not lies_along(points_of(there)) and not flat(there) and not self._rests(there):
                 return Traced(points, events, "ceases")
             if len(points) - len(events) >= count:
                 return Traced(points, events, "points")
         return Traced(points, events, "lost")
+
+    def _rests(self, at: Standing) -> bool:
+        """Whether a member lies, to the accuracy, from the last place that presses up to its end, without a force."""
+        closest, lifted = self.run.closest, self.run.accuracy * self.run.scene.size
+        pressed = ((point, min(max(point.at[0], 0.0), 1.0)) for point in points_of(at) if len(point.members) == 1)
+        return any(
+            closest.lies_up_to(at.fields, point.pair, x, end, lifted)
+            for point, x in pressed
+            for end in (0.0, 1.0)
+            if end != x
+        )
 
     def _next(
         self, now: Standing, length: float, begins: Sequence[ContactPoint]

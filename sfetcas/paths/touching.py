@@ -521,6 +521,9 @@ class Touching(Conditions[_At]):
         if any(self.closest.lies(fields, point.pair, *sorted((x, point.at[0]))) for x in beside):
             return True
         at = min(max(point.at[0], 0.0), 1.0)
+        # What is beyond the last place that presses may lie there without a force.
+        if any(self.closest.lies_up_to(fields, point.pair, at, end) for end in (0.0, 1.0) if end != at):
+            return True
         if at in (0.0, 1.0):
             (slope,) = self.closest.slopes(fields, point.pair, (at,)).tolist()
             if (1.0 - 2.0 * at) * slope > NEAR:

@@ -36,6 +36,12 @@ NEAR_TARGET = 0.05
 SAME_GAP = 1e-6
 """Gaps, dimensionless, that differ by less are the same: of such shapes that of less energy begins."""
 
+SAME_ENERGY = 1e-9
+"""Energies that differ by less than this share of the largest are the same."""
+
+SHARES = tuple(0.5**k for k in range(16))
+"""Of the bow, that are tried."""
+
 BOW = 0.2
 """Largest slope (rad) of the bow: enough slack for the first closing step, little enough to choose no branch."""
 
@@ -233,11 +239,27 @@ def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -
     """Straight members bent slightly, each by itself or chains as a whole, to the side of least potential."""
     sides = []
     for vectors in (_bow(equations), _tent(equations)):
-        for sign in (1.0, -1.0):
+        share = _fitting(equations, state, loading, vectors)
+        for sign in (share, -share):
             bent = replace(state, q=_turned_by(equations, state, sign * vectors))
             closed, gap = restore(equations, bent, loading, weight)
             sides.append((gap, equations.at(closed, loading).potential, bent))
     return _least(sides)[2]
+
+
+def _fitting(equations: Equations, state: State, loading: Loading, vectors: Array) -> float:
+    """The share of a bend by vectors (rotations, 3), rad, that leaves the least gap; 1 where the least is best.
+
+    Closing much more than it has to takes away a bend leaves short waves, which may lie on its other side.
+    """
+
+    def gap(share: float) -> float:
+        bent = equations.holding(replace(state, q=_turned_by(equations, state, share * vectors)), loading)
+        return float(np.abs(equations.at(bent, loading).residual[equations.unknowns :]).max())
+
+    gaps = [gap(share) for share in SHARES]
+    best = int(np.argmin(gaps))
+    return SHARES[best] if best < len(SHARES) - 1 else 1.0
 
 
 def _least(sides: list[tuple[float, float, State]], near: float = 0.0) -> tuple[float, float, State]:
@@ -247,8 +269,8 @@ def _least(sides: list[tuple[float, float, State]], near: float = 0.0) -> tuple[
     """
     most = max(near, min(gap for gap, _, _ in sides) + SAME_GAP)
     closed = [side for side in sides if side[0] <= most]
-    lowest = min(energy for _, energy, _ in closed)
-    return next(side for side in closed if side[1] <= lowest + 1e-9 * max(1.0, abs(lowest)))
+    lowest, largest = min(energy for _, energy, _ in closed), max(abs(energy) for _, energy, _ in closed)
+    return next(side for side in closed if side[1] <= lowest + SAME_ENERGY * largest)
 
 
 def _tent(equations: Equations) -> Array:
