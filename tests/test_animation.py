@@ -78,6 +78,37 @@ def test_a_frame_shows_its_answer_and_supports_keep_their_sides(table):
     assert len(film._sheet.drawn) == len(film._marks(0))  # those of earlier frames are gone
 
 
+def test_an_obstacle_on_a_node_moves_with_it():
+    table = {
+        "sections": {"strip": {"EI3": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "B": {"position": [1, 0]},
+            "ram": {"position": [0.8, 0.2], "support": "clamped"},
+        },
+        "members": {"strip": {"nodes": ["A", "B"], "section": "strip"}},
+        "motions": {"down": {"node": "ram", "displacement": [0, -0.3]}},
+        "contacts": {
+            "roll": {"type": "circle", "center": [0.8, 0.2], "radius": 0.05, "node": "ram", "member": "strip"},
+            "floor": {"type": "circle", "center": [0.5, -0.3], "radius": 0.1, "member": "strip"},
+        },
+        "analysis": {"steps": [0.0, 0.5, 1.0]},
+    }
+    steps = solve(Scene.from_dict(table)).steps
+    film = _Film(steps, ["now"] * 3, 10, "", gravity=0.0)
+    middles = [
+        {
+            name: np.mean([np.nanmean(mark.points, axis=0) for mark in film._marks(i) if mark.name == name], axis=0)
+            for name in ("contact-roll", "contact-floor")
+        }
+        for i in range(3)
+    ]
+    # Circles are drawn as polygons, which begin anywhere.
+    down = [one["contact-roll"] - middles[0]["contact-roll"] for one in middles]
+    np.testing.assert_allclose(down, [[0, 0, 0], [0, -0.15, 0], [0, -0.3, 0]], atol=1e-3)
+    assert middles[2]["contact-floor"] == pytest.approx(middles[0]["contact-floor"])
+
+
 @pytest.mark.parametrize(
     ("span", "count", "rate", "said"),
     [

@@ -17,6 +17,29 @@ from sfetcas.mechanics.model import assemble
 FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "m"}
 
 
+def test_pressure_along_a_line_is_what_lies_on_it_or_is_wound_round_it():
+    """On a floor the weight; on a drum the tension over the radius; with what presses at its ends it is the force."""
+    *_, lying = solve(load("problems/floor_heavy_cantilever.toml")).steps
+    (begin, end), at = lying.contacts["floor"]["at"], np.array([0.5, 0.8, 0.86, 0.93, 0.99])
+    # The pressure has the accuracy of forces, two derivatives of positions.
+    assert lying.along("beam", at)["pressure"][:, 1] == pytest.approx([0, 0, 30, 30, 30], abs=1e-4)
+    jump = lying.along("beam", [begin - 1e-9, begin + 1e-9])["force"]
+    whole = lying.contacts["floor"]["force"]
+    assert whole == pytest.approx(jump[0] - jump[1] + [0, 30 * (end - begin), 0], abs=1e-4)
+    assert value_of(lying, "members.beam.pressure", at=0.93) == pytest.approx([0, 30, 0], abs=1e-4)
+
+    drum = load("problems/drum_cantilever_tip_force.toml")
+    (member,), (radius, centre) = drum.members, (drum.contacts["drum"].radius, drum.contacts["drum"].center)
+    last = solve(drum).last
+    begin, end = last.contacts["drum"]["at"]
+    found = last.along(member, np.linspace(begin, end, 9)[1:-1])
+    outwards = found["position"] - np.array([*centre[:2], 0.0])
+    outwards /= np.linalg.norm(outwards, axis=1)[:, None]
+    tangents = np.stack([outwards[:, 1], -outwards[:, 0], np.zeros(7)], axis=1)
+    tension = np.abs(np.einsum("ni,ni->n", found["force"], tangents))
+    assert np.einsum("ni,ni->n", found["pressure"], outwards) == pytest.approx(tension / radius, rel=1e-3)
+
+
 def above(height, *, length=1.0, contact=None, **more):
     """A cantilever along x at a height above a floor."""
     return {

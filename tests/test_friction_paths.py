@@ -194,6 +194,21 @@ def test_refused(more, sentence):
         solve(ladder(**more))
 
 
+def test_a_node_that_is_held_inside_an_obstacle_is_named_at_once():
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {"A": {"position": [0, 0.1], "support": "clamped"}, "B": {"position": [1, 0.1]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "motions": {"down": {"node": "A", "displacement": [0, -0.2], "history": "first"}},
+        "loads": {"aside": {"type": "force", "node": "B", "value": [0.1, 0]}},
+        "histories": {"first": {"t": [0], "value": [1]}},
+        "contacts": {"floor": {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all", "friction": 0.2}},
+        "analysis": path(1),
+    }
+    with pytest.raises(SolveError, match="node A is held 0.1 m inside contacts.floor"):
+        solve(Scene.from_dict(table))
+
+
 def test_what_is_drawn_aside_turns_and_slides_away_in_the_end():
     """A body on three feet of 1 N each that is drawn at one of them: its feet slip one after the other, and it turns
     until all friction, 0.9 of 2 N, is against the pull.

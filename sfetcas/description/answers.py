@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..errors import SceneError
+from .obstacles import members_of
 from .records import say, unknown
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "answer_name",
     "answers_table",
     "check_answer",
+    "may_lie",
     "outlined",
     "selected",
     "single_number",
@@ -132,6 +134,14 @@ def outlined(scene: Any, record: Any) -> bool:
     return section.shape is not None and section.law is section.coupling is section.stretch_law is None
 
 
+def may_lie(scene: Any, record: Any) -> bool:
+    """Whether a member is flexible and obstacles stop it, so that it may lie along one."""
+    stops = [contact for contact in scene.contacts.values() if not contact.between_members]
+    return record.type == "flexible" and any(
+        scene.members[name] is record for stop in stops for name in members_of(stop, scene.members)
+    )
+
+
 TABLE = """
 factor | | | statics, motion | factor of the loads and motions; of a motion its time
 omega | rad/s | | statics | at flutter points: angular frequency of the motion that grows
@@ -151,6 +161,7 @@ members.NAME.curvature at | 1/m | b1 b2 b3 | statics, motion, parameters | whole
 members.NAME.strain at | | b1 b2 b3 | statics, motion, parameters | stretch (b1), shear (b2, b3), where it yields
 members.NAME.bending_strain at | | | statics, motion, parameters | largest, with a shape and neither law nor coupling
 members.NAME.bending_stress at | Pa | | statics, motion, parameters | E times that strain
+members.NAME.pressure at | N/m | x y z | statics | of an obstacle that it lies along, with friction; not at single places
 members.NAME.velocity at | m/s | x y z | motion | of the centre line; not of small members
 members.NAME.angular_velocity at | rad/s | x y z | motion | of the sections; not of small members
 members.NAME.energy | J | | statics, motion, parameters | strain energy of a member that is not rigid
@@ -225,6 +236,7 @@ APPLIES: dict[str, Callable[[Any, Any], bool]] = {
     "members.NAME.bending_stress": outlined,
     "members.NAME.largest_bending_strain": outlined,
     "members.NAME.largest_bending_stress": outlined,
+    "members.NAME.pressure": may_lie,
     "members.NAME.velocity": lambda scene, member: member.type != "small",
     "members.NAME.angular_velocity": lambda scene, member: member.type != "small",
     "members.NAME.energy": lambda scene, member: member.type != "rigid",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..contact import closest
-from ..description.answers import STATICS, outlined
+from ..description.answers import STATICS, may_lie, outlined
 from ..description.records import brief, counted, nearest, plain
 from ..description.showing import (
     error_in_words,
@@ -459,6 +459,17 @@ class Equilibrium(Configuration):
     def lines(self) -> list[str]:
         """The first nodes that can move, and the first note, in words."""
         return [*self._moved(), *notes_in_words(self.notes)]
+
+    def along(self, member: str, at: Any) -> dict[str, Array]:
+        """As of :meth:`.Configuration.along`.
+
+        Of a flexible member that obstacles stop also the ``pressure`` (n, 3) N/m of those that it lies along, see
+        :meth:`.Fields.pressure`.
+        """
+        found = super().along(member, at)
+        if may_lie(self.model.scene, self.model.scene.members[member]):
+            found["pressure"] = self.fields.pressure(member, np.atleast_1d(at))
+        return found
 
     @property
     def _energies(self) -> tuple[float, float]:

@@ -247,6 +247,26 @@ class Fields:
             found[model.beams.first[point.members[0]] + np.array(beside)] += forces
         return found
 
+    def pressure(self, member: str, x: Array) -> Array:
+        """Pressure (n, 3), N/m, of obstacles that a flexible member lies along, at fractions x (n,) of its length.
+
+        It is linear along elements, at whose ends it may jump, and has the friction of rough obstacles.  What presses
+        at single places is no part of it.
+        """
+        mesh, x = self.model.mesh, np.asarray(x, dtype=float)
+        found, cuts, (points, weights) = np.zeros((len(x), 3)), mesh.cuts[member], mesh.rule
+        if not mesh.lies:
+            return found
+        element = np.clip(np.searchsorted(cuts, x, side="right") - 1, 0, len(cuts) - 2)
+        lengths = np.diff(cuts)
+        forces = self._pressing[self.model.beams.first[member] + np.arange(len(lengths))] * self.model.scales.force
+        forces /= weights[:, None] * (lengths * self.model.scene.center_lines[member].length)[:, None, None]
+        for e in np.unique(element):
+            here = element == e
+            values = evaluation(points, (x[here] - cuts[e]) / lengths[e]) @ forces[e]
+            found[here, : forces.shape[2]] = values
+        return found
+
     @functools.cached_property
     def _pushed(self) -> dict[str, list[tuple[float, Array | None]]]:
         """Where rings, other members and obstacles push members, by member: fraction of the length, and within elements

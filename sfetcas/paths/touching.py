@@ -19,6 +19,7 @@ from typing import ClassVar
 import numpy as np
 
 from .. import tolerances
+from ..contact.held_inside import refuse_held_inside
 from ..contact.lines import LINE, lies_along, points_in, points_of
 from ..contact.member_contact import MemberContact
 from ..contact.pairs import ONE, Near, doing
@@ -232,6 +233,7 @@ class Touching(Conditions[_At]):
     def _begun_by_steps(self, zero: Solved, span: tuple[float, float]) -> Begun:
         """The first point of a path with friction: loads have grown from zero to those at the begin of the range."""
         begin = float(np.clip(0.0, *span))
+        refuse_held_inside(self.scene, zero.prepared, begin)
         now = self.run.lying(zero)
         ways = [lambda t: lambda model: model.loading(0.0, t)] if self.scene.histories else []
         ways += [functools.partial(on_way, 0.0, begin)] if begin else []

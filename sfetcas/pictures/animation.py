@@ -332,8 +332,15 @@ class _Film(Film):
 
     def _marks(self, number: int) -> list[Mark]:
         """Marks at a step: supports as at the first one, only carried along, so that they keep their sides."""
-        sketch = self._sketched(number)
-        moving = [mark for mark in sketch.marks if not mark.name.startswith(STANDING)]
+        sketch, carried = (
+            self._sketched(number),
+            {f"contact-{name}" for name, c in self._scene.contacts.items() if c.node},
+        )
         nodes = {f"support-{name}": sketch.at(name) - self._first.at(name) for name in self._scene.nodes}
-        standing = [mark for mark in self._first.marks if mark.name.startswith(STANDING)]
+
+        def stands(mark: Mark) -> bool:
+            return mark.name.startswith(STANDING) and mark.name not in carried
+
+        moving = [mark for mark in sketch.marks if not stands(mark)]
+        standing = [mark for mark in self._first.marks if stands(mark)]
         return [replace(mark, points=mark.points + nodes.get(mark.name, 0.0)) for mark in standing] + moving
