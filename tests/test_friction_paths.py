@@ -205,7 +205,7 @@ def test_a_node_that_is_held_inside_an_obstacle_is_named_at_once():
         "contacts": {"floor": {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all", "friction": 0.2}},
         "analysis": path(1),
     }
-    with pytest.raises(SolveError, match="node A is held 0.1 m inside contacts.floor"):
+    with pytest.raises(SolveError, match=r"node A is held 0\.1 m inside contacts\.floor"):
         solve(Scene.from_dict(table))
 
 

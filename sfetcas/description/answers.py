@@ -161,7 +161,7 @@ members.NAME.curvature at | 1/m | b1 b2 b3 | statics, motion, parameters | whole
 members.NAME.strain at | | b1 b2 b3 | statics, motion, parameters | stretch (b1), shear (b2, b3), where it yields
 members.NAME.bending_strain at | | | statics, motion, parameters | largest, with a shape and neither law nor coupling
 members.NAME.bending_stress at | Pa | | statics, motion, parameters | E times that strain
-members.NAME.pressure at | N/m | x y z | statics | of an obstacle that it lies along, with friction; not at single places
+members.NAME.pressure at | N/m | x y z | statics | of what it lies along, with friction; not at single places
 members.NAME.velocity at | m/s | x y z | motion | of the centre line; not of small members
 members.NAME.angular_velocity at | rad/s | x y z | motion | of the sections; not of small members
 members.NAME.energy | J | | statics, motion, parameters | strain energy of a member that is not rigid

@@ -71,6 +71,9 @@ SHY = 0.99
 TRIES, ROUNDS = 12, 40
 """How often Newton's method with friction is tried, and rounds over all contacts between two tries."""
 
+AWAY = 1e9
+"""Forces so many times those that contacts ask for alone are of rounds that lead away, as these may with friction."""
+
 
 @dataclass(frozen=True, eq=False)
 class Friction:
@@ -319,7 +322,10 @@ def _rough(matrix: Sparse, b: Array, begin: Array, least: float, friction: Frict
         found = _by_newton_with_friction(matrix, b, x, least, friction)
         if found is not None:
             break
-        x = _one_by_one(rows, b, x, friction)
+        nearer = _one_by_one(rows, b, x, friction)
+        if nearer is None:
+            break
+        x = nearer
     return found
 
 
@@ -389,11 +395,13 @@ def _matrix(parts: tuple[tuple[Array, Array, Array], ...], size: int) -> Sparse:
     return coo_matrix((values, (rows, columns)), shape=(size, size)).tocsr()
 
 
-def _one_by_one(matrix: Sparse, b: Array, begin: Array, friction: Friction) -> Array:
-    """Rounds over all contacts, each of which is solved by itself."""
+def _one_by_one(matrix: Sparse, b: Array, begin: Array, friction: Friction) -> Array | None:
+    """Rounds over all contacts, each of which is solved by itself; None where they lead away."""
     x, where = begin.copy(), {int(row): k for k, row in enumerate(friction.across)}
     stiff = [float(np.linalg.eigvalsh(_symmetric(matrix, own)).max(initial=TINY)) for own in friction.along]
     diagonal, normal = matrix.diagonal(), np.setdiff1d(np.arange(len(b)), friction.along).tolist()
+    # Each of them alone asks for no more at first.
+    farthest = float(np.abs(begin).max()) + float((np.abs(b) / np.maximum(np.abs(diagonal), TINY)).max())
 
     def opening(row: int) -> float:
         begin, end = matrix.indptr[row : row + 2]
@@ -407,6 +415,8 @@ def _one_by_one(matrix: Sparse, b: Array, begin: Array, friction: Friction) -> A
                 own = friction.along[k]
                 wished = x[own] - np.array([opening(j) for j in own.tolist()]) / stiff[k]
                 x[own] = _allowed(wished[None], friction.coefficients[k : k + 1] * x[i])[0]
+        if not np.abs(x).max() < AWAY * farthest:
+            return None
     return x
 
 
