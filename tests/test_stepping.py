@@ -442,6 +442,16 @@ def test_complementarity_against_all_choices(count, rank, dense, monkeypatch):
     np.testing.assert_allclose(rows.T @ found, best[0], atol=1e-7)
 
 
+def test_rounds_over_rough_contacts_that_lead_away_are_given_up(monkeypatch):
+    """Friction turns impulses about: contacts one by one may ask each other for more and more, up to an overflow."""
+    monkeypatch.setattr(complementarity, "_by_newton_with_friction", lambda *a: None)
+    matrix = np.eye(4)
+    # Both slide, and the friction of each presses the other one.
+    matrix[[2, 3], [0, 1]], matrix[[1, 0], [2, 3]] = 10.0, 2.0
+    law = Friction(np.arange(2), 2 + np.arange(2).reshape(2, 1), np.array([5.0, 5.0]))
+    assert complementary(csc_matrix(matrix), np.array([-1.0, -2.0, 0.5, 0.3]), np.zeros(4), law) is None
+
+
 @pytest.mark.parametrize("directions", [1, 2])
 @pytest.mark.parametrize("start", ["newton", "rounds"])
 def test_impulses_obey_the_law_of_coulomb(directions, start, monkeypatch):

@@ -259,6 +259,7 @@ class Events:
             seconds = memory.t * self.stepper.time
             names = ", ".join(dict.fromkeys(event.part.where for event in self.found[-MOST:]))
             detail = f"at {seconds:.9g} s one impact or release follows another, {MOST} of them, of {names}"
+            detail += ": 'stepping' takes many at once"
             raise SolveError(Status.STOPPED, detail, memory)
 
     def _ebbing(self, t: float, speeds: Array) -> Array:
