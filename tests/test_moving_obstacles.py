@@ -276,6 +276,34 @@ def test_rising_floor_carries_a_bar_that_does_not_rebound():
     assert last.reaction("F")[1][2] == pytest.approx(0.2, abs=1e-8)
 
 
+def test_a_level_bar_leaves_a_floor_that_stops_rising_with_both_ends_at_once():
+    """Where the floor is braked by more than gravity; the two releases are one to rounding, which must not turn it."""
+    table = {
+        "sections": {"s": {"rhoA": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0]},
+            "B": {"position": [0.4, 0]},
+            "G": {"position": [0, -1], "support": "clamped"},
+        },
+        "members": {"bar": {"nodes": ["A", "B"], "section": "s", "type": "rigid"}},
+        "gravity": [0, -10],
+        "motions": {"g": {"node": "G", "displacement": [0, 0.3], "history": "h"}},
+        "histories": {"h": {"t": [0, 0.1], "polynomial": [[0, 0, 0, 10, -15, 6]]}},
+        "contacts": {"floor": {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "bar", "node": "G"}},
+        "analysis": {"type": "dynamic", "end": 0.3, "accuracy": 1e-4, "output": 0.3},
+    }
+    motion = solve(Scene.from_dict(table))
+    rises = np.polynomial.Polynomial([0, 0, 0, 10, -15, 6])
+    shares = (0.3 * rises.deriv(2) + 10 * 0.1**2).roots()
+    (share,) = [z.real for z in shares if abs(z.imag) < 1e-12 and 0.5 < z.real < 0.7]
+    assert [event.time for event in motion.events] == pytest.approx([0.1 * share] * 2, abs=1e-7)
+    flies = 0.3 - 0.1 * share
+    height = 0.3 * rises(share) + 3.0 * rises.deriv()(share) * flies - 5.0 * flies**2
+    # Either end: without a torque the bar does not turn.
+    for end in "AB":
+        assert motion.last.position(end)[1] == pytest.approx(height, abs=1e-6)
+
+
 def bead(dimension):
     """A bead on an arm that turns with the speed of one."""
     return {

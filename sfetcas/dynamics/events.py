@@ -213,7 +213,9 @@ class Events:
             return Passed(steps, self._after(memory, closes, nothing, taken.h))
         soon = self._soon(self._consistent(memory), self._length(taken.h))
         least = np.concatenate([np.where(acting, soon.forces, np.inf), soon.spare])
-        first = np.arange(len(least)) == np.argmin(least)
+        # The first of them, and those that cease with it, as far as that is located.
+        before = np.abs(taken.begin.lam[self.rows]).max(initial=0.0)
+        first = least <= least.min() + soon.rounding + WITH_IT * before
         ceases, slips = first[: len(acting)], first[len(acting) :]
         return Passed(steps, self._after(memory, nothing, ceases, taken.h, slips))
 
@@ -752,6 +754,9 @@ TOGETHER = 1e-9
 
 XTOL, RELEASED = 1e-13, 1e-7
 """Shares of a step to which an impact is located, and a release: the force being near zero, that errs by their cube."""
+
+WITH_IT = 10.0 * RELEASED
+"""Share of the force at the begin of a step by which others that cease with the first may be above it."""
 
 SHARE, LEAST, SHORTER = 0.05, 3e-4, 0.2
 """Share of a step in which forces are found, its least length, dimensionless, for the sake of rounding, and by what it
