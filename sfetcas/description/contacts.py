@@ -130,9 +130,13 @@ class Contact(Record):
         if isinstance(self.side, str) != (self.type in ("circle", "cylinder", "sphere")) and self.side is not None:
             accepted = "a direction [x, y] or [x, y, z]" if isinstance(self.side, str) else "inside or outside"
             raise SceneError(f"found {say(self.side)}, accepted for a {self.type}: {accepted}", ("side",))
-        along = self.type == "plane" and isinstance(self.side, tuple) and self.normal is not None
-        if along and abs(unit(self.side) @ unit(self.normal)) < tolerances.PARALLEL:
-            raise SceneError(f"found {say(self.side)}, which is along the plane, accepted: out of it", ("side",))
+        if isinstance(self.side, tuple):
+            along = self.type == "plane" and self.normal is not None
+            if along and abs(unit(self.side) @ unit(self.normal)) < tolerances.PARALLEL:
+                raise SceneError(f"found {say(self.side)}, which is along the plane, accepted: out of it", ("side",))
+            along = self.type == "line" and self.direction is not None
+            if along and float(np.linalg.norm(np.cross(unit(self.side), unit(self.direction)))) < tolerances.PARALLEL:
+                raise SceneError(f"found {say(self.side)}, which is along the line, accepted: across it", ("side",))
         return self
 
     @property
