@@ -36,8 +36,8 @@ NEAR_TARGET = 0.05
 SAME_GAP = 1e-6
 """Gaps, dimensionless, that differ by less are the same: of such shapes that of less energy begins."""
 
-SAME_ENERGY = 1e-9
-"""Energies that differ by less than this share of the largest are the same."""
+SAME_ENERGY, ROUNDED = 1e-9, 1e-12
+"""Energies that differ by less than this share of the largest, or dimensionless by what is rounding, are the same."""
 
 SHARES = tuple(0.5**k for k in range(16))
 """Of the bow, that are tried."""
@@ -270,7 +270,7 @@ def _least(sides: list[tuple[float, float, State]], near: float = 0.0) -> tuple[
     most = max(near, min(gap for gap, _, _ in sides) + SAME_GAP)
     closed = [side for side in sides if side[0] <= most]
     lowest, largest = min(energy for _, energy, _ in closed), max(abs(energy) for _, energy, _ in closed)
-    return next(side for side in closed if side[1] <= lowest + SAME_ENERGY * largest)
+    return next(side for side in closed if side[1] <= lowest + SAME_ENERGY * largest + ROUNDED)
 
 
 def _tent(equations: Equations) -> Array:
