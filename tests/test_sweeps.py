@@ -184,6 +184,7 @@ def test_what_an_answer_may_be_without_is_left_open():
     found = here(scene, {"loads.tip.value.1": [-0.1, -3.0]}, ["contacts.floor.at", TIP])
     assert found.solved.all()
     assert np.isnan(found.values("contacts.floor.at")[0])
+    assert ["there is no contacts.floor.at" in notes for notes in found.table["notes"]] == [True, False]
     assert found.values("contacts.floor.at")[1] == pytest.approx(1.0, abs=1e-6)  # the end, to rounding of its place
 
 

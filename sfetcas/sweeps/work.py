@@ -129,11 +129,12 @@ def _answered(job: Job, answer: Answer, seconds: float) -> Outcome:
     except SceneError as error:
         return Outcome(UNANSWERED, str(error), seconds=seconds)
     solved = answer.status is Status.SOLVED
+    lacking = [f"there is no {one.text}" for one, found in zip(job.wanted, numbers, strict=True) if not found.size]
     return Outcome(
         SOLVED if solved else SHORT,
         "" if solved else answer.status.value,
         numbers,
-        "; ".join(_notes(answer)),
+        "; ".join([*lacking, *_notes(answer)]),
         _error_estimate(answer),
         seconds,
     )
