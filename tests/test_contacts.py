@@ -488,6 +488,10 @@ def test_directions_may_have_any_length(length):
         ({**FLAT, "members": [5]}, "contacts.floor.members.0: found 5, accepted: a text"),
         ({**FLAT, "member": "m", "side": [2, 1e-9]}, "side: found [2.0, 1e-09, 0.0], which is along the plane"),
         (
+            {"type": "circle", "center": [1e300, 0], "radius": 0.1, "member": "m"},
+            "contacts.floor.center: found a centre 1e+300 m away, accepted: up to 1e+09 times the size of the scene",
+        ),
+        (
             {"type": "line", "point": [0, 0], "direction": [1, 0], "side": [-2, 0], "member": "m"},
             "side: found [-2.0, 0.0, 0.0], which is along the line, accepted: across it",
         ),

@@ -990,6 +990,12 @@ def _check_contacts(scene: Scene) -> None:
                 f"found {contact.radius:g} m, accepted: up to {FLATTEST:g} times the size of the scene; a plane is flat"
             )
             raise SceneError(message, ("contacts", name, "radius"))
+        if contact.center is not None:
+            first = next(iter(scene.nodes.values())).position
+            away = float(np.abs(np.asarray(contact.center) - np.asarray(first)).max())
+            if away > FLATTEST * scene.size:
+                message = f"found a centre {away:g} m away, accepted: up to {FLATTEST:g} times the size of the scene"
+                raise SceneError(message, ("contacts", name, "center"))
         for member in members_of(contact, scene.members):
             if member in magnetised:
                 message = (
@@ -1018,7 +1024,7 @@ def _check_contacts(scene: Scene) -> None:
 
 
 FLATTEST = 1e9
-"""Radius of something round over the size, at which gaps are known to 1e-7 of the size."""
+"""Radius of something round, and how far its centre is away, over the size, at which gaps are known to 1e-7 of it."""
 
 
 def _check_carried(scene: Scene, name: str, node: str) -> None:
