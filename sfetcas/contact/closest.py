@@ -371,6 +371,18 @@ class Closest:
         level = abs(float(slope[0])) * self.scene.size < max(self.lying, lifted)
         return level and self.lies(fields, pair, min(begin, end), max(begin, end), lifted)
 
+    def rests(self, fields: Fields, pair: PairKey, at: float, lifted: float = 0.0) -> bool:
+        """Whether a member lies on an obstacle from the last place that presses, ``at``, up to an end, without a force.
+
+        ``lifted`` as of :meth:`lies`.
+        """
+        return any(
+            self.lies_up_to(fields, pair, at, end, lifted)
+            and abs(self.bends(fields, pair, end)) * self.scene.size < LEVEL
+            for end in (0.0, 1.0)
+            if end != at
+        )
+
     def gap_at(self, fields: Fields, pair: PairKey, at: float) -> float:
         """Gap, m, between a place of a member and an obstacle."""
         return float(self._gaps(fields, self.pairs[pair], np.array([at]))[0][0])
@@ -602,6 +614,9 @@ def _extent(mesh: Mesh, point: ContactPoint, entry: dict[str, Any]) -> tuple[flo
         return entry["at"], entry["at"]
     return float(cuts[cut - point.sides[0]]), float(cuts[cut + point.sides[1]])
 
+
+LEVEL = 1e-4
+"""Curvature of the gap, over the size, that is none but for errors of the mesh at an end: what is round turns away."""
 
 NEARBY = 1.0
 """Distance up to which the gap of members that do not touch is told, in sizes of the scene."""

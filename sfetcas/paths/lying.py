@@ -219,13 +219,10 @@ class Lying:
 
     def _rests(self, at: Standing) -> bool:
         """Whether a member lies, to the accuracy, from the last place that presses up to its end, without a force."""
-        closest, lifted = self.run.closest, self.run.accuracy * self.run.scene.size
-        pressed = ((point, min(max(point.at[0], 0.0), 1.0)) for point in points_of(at) if len(point.members) == 1)
+        lifted = self.run.accuracy * self.run.scene.size
+        pressed = (point for point in points_of(at) if len(point.members) == 1)
         return any(
-            closest.lies_up_to(at.fields, point.pair, x, end, lifted)
-            for point, x in pressed
-            for end in (0.0, 1.0)
-            if end != x
+            self.run.closest.rests(at.fields, point.pair, min(max(point.at[0], 0.0), 1.0), lifted) for point in pressed
         )
 
     def _next(

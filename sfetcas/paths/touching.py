@@ -524,7 +524,7 @@ class Touching(Conditions[_At]):
             return True
         at = min(max(point.at[0], 0.0), 1.0)
         # What is beyond the last place that presses may lie there without a force.
-        if any(self.closest.lies_up_to(fields, point.pair, at, end) for end in (0.0, 1.0) if end != at):
+        if self.closest.rests(fields, point.pair, at):
             return True
         if at in (0.0, 1.0):
             (slope,) = self.closest.slopes(fields, point.pair, (at,)).tolist()
