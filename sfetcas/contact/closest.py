@@ -28,7 +28,7 @@ from ..mechanics.tables import Tables
 from .nearby import ALIKE, ITERATIONS, Nearby, Places
 from .pairs import SAME, Near, Pair, PairKey
 
-__all__ = ["BEHIND_EDGE", "LIFTED", "Closest", "answers", "first_there"]
+__all__ = ["AT_END", "BEHIND_EDGE", "LIFTED", "Closest", "answers", "first_there"]
 
 PIECES, COARSE = 4, 2
 """Straight pieces of an element at least, and how many times fewer and longer they are in a coarse search: chains then
@@ -378,7 +378,7 @@ class Closest:
         """
         return any(
             self.lies_up_to(fields, pair, at, end, lifted)
-            and abs(self.bends(fields, pair, end)) * self.scene.size < LEVEL
+            and abs(self.bends(fields, pair, end)) * self.scene.size < AT_END
             for end in (0.0, 1.0)
             if end != at
         )
@@ -615,8 +615,8 @@ def _extent(mesh: Mesh, point: ContactPoint, entry: dict[str, Any]) -> tuple[flo
     return float(cuts[cut - point.sides[0]]), float(cuts[cut + point.sides[1]])
 
 
-LEVEL = 1e-4
-"""Curvature of the gap, over the size, that is none but for errors of the mesh at an end: what is round turns away."""
+AT_END = 1e-4
+"""Curvature of a gap, dimensionless, that is none but for errors of the mesh at a free end of a member."""
 
 NEARBY = 1.0
 """Distance up to which the gap of members that do not touch is told, in sizes of the scene."""

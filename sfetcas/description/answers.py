@@ -138,7 +138,7 @@ def may_lie(scene: Any, record: Any) -> bool:
     """Whether a member is flexible and obstacles stop it, so that it may lie along one."""
     stops = [contact for contact in scene.contacts.values() if not contact.between_members]
     return record.type == "flexible" and any(
-        scene.members[name] is record for stop in stops for name in members_of(stop, scene.members)
+        stop.members == "all" or any(scene.members[name] is record for name in members_of(stop, ())) for stop in stops
     )
 
 

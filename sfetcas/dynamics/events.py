@@ -215,7 +215,7 @@ class Events:
         least = np.concatenate([np.where(acting, soon.forces, np.inf), soon.spare])
         # The first of them, and those that cease with it, as far as that is located.
         before = np.abs(taken.begin.lam[self.rows]).max(initial=0.0)
-        first = least <= least.min() + soon.rounding + WITH_IT * before
+        first = least <= least.min() + soon.rounding + RELEASED_WITH * before
         ceases, slips = first[: len(acting)], first[len(acting) :]
         return Passed(steps, self._after(memory, nothing, ceases, taken.h, slips))
 
@@ -261,7 +261,8 @@ class Events:
             seconds = memory.t * self.stepper.time
             names = ", ".join(dict.fromkeys(event.part.where for event in self.found[-MOST:]))
             detail = f"at {seconds:.9g} s one impact or release follows another, {MOST} of them, of {names}"
-            detail += ": 'stepping' takes many at once"
+            # It knows no strings and stops.
+            detail += ": 'stepping' takes many at once" if self._of_obstacles.all() else ""
             raise SolveError(Status.STOPPED, detail, memory)
 
     def _ebbing(self, t: float, speeds: Array) -> Array:
@@ -755,7 +756,7 @@ TOGETHER = 1e-9
 XTOL, RELEASED = 1e-13, 1e-7
 """Shares of a step to which an impact is located, and a release: the force being near zero, that errs by their cube."""
 
-WITH_IT = 10.0 * RELEASED
+RELEASED_WITH = 10.0 * RELEASED
 """Share of the force at the begin of a step by which others that cease with the first may be above it."""
 
 SHARE, LEAST, SHORTER = 0.05, 3e-4, 0.2

@@ -19,6 +19,7 @@ from typing import ClassVar
 import numpy as np
 
 from .. import tolerances
+from ..contact.closest import AT_END
 from ..contact.held_inside import refuse_held_inside
 from ..contact.lines import LINE, lies_along, points_in, points_of
 from ..contact.member_contact import MemberContact
@@ -55,9 +56,9 @@ LEFT = 1e-8
 no direction in which the Lagrangian is clearly largest.
 """
 
-STRAIGHT, AT_END = 1e-6, 1e-4
+STRAIGHT = 1e-6
 """Curvature of a gap, dimensionless, below which a member begins to lie along something: where it is zero the place is
-not known.  At a free end it is zero, but for errors of the mesh.
+not known.
 """
 
 OPEN = 1.0

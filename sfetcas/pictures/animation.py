@@ -332,10 +332,8 @@ class _Film(Film):
 
     def _marks(self, number: int) -> list[Mark]:
         """Marks at a step: supports as at the first one, only carried along, so that they keep their sides."""
-        sketch, carried = (
-            self._sketched(number),
-            {f"contact-{name}" for name, c in self._scene.contacts.items() if c.node},
-        )
+        sketch = self._sketched(number)
+        carried = {f"contact-{name}" for name, contact in self._scene.contacts.items() if contact.node}
         nodes = {f"support-{name}": sketch.at(name) - self._first.at(name) for name in self._scene.nodes}
 
         def stands(mark: Mark) -> bool:

@@ -39,8 +39,8 @@ SAME_GAP = 1e-6
 SAME_ENERGY, ROUNDED = 1e-9, 1e-12
 """Energies that differ by less than this share of the largest, or dimensionless by what is rounding, are the same."""
 
-SHARES = tuple(0.5**k for k in range(16))
-"""Of the bow, that are tried."""
+SHARES, ALIKE = tuple(0.5**k for k in range(16)), 1.001
+"""Shares of the bow that are tried, and the ratio of gaps that are as good as each other."""
 
 BOW = 0.2
 """Largest slope (rad) of the bow: enough slack for the first closing step, little enough to choose no branch."""
@@ -248,7 +248,7 @@ def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -
 
 
 def _fitting(equations: Equations, state: State, loading: Loading, vectors: Array) -> float:
-    """The share of a bend by vectors (rotations, 3), rad, that leaves the least gap; 1 where the least is best.
+    """The largest share of a bend by vectors (rotations, 3), rad, that leaves the least gap; 1 where the least is best.
 
     Closing much more than it has to takes away a bend leaves short waves, which may lie on its other side.
     """
@@ -258,8 +258,9 @@ def _fitting(equations: Equations, state: State, loading: Loading, vectors: Arra
         return float(np.abs(equations.at(bent, loading).residual[equations.unknowns :]).max())
 
     gaps = [gap(share) for share in SHARES]
-    best = int(np.argmin(gaps))
-    return SHARES[best] if best < len(SHARES) - 1 else 1.0
+    # Gaps that the bend does not change differ by rounding.
+    best = next(share for share, one in zip(SHARES, gaps, strict=True) if one <= ALIKE * min(gaps))
+    return best if best > SHARES[-1] else 1.0
 
 
 def _least(sides: list[tuple[float, float, State]], near: float = 0.0) -> tuple[float, float, State]:
