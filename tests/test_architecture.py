@@ -225,6 +225,7 @@ ORDER = [
     "dynamics.coupling",
     "dynamics.gaps",
     "dynamics.stepping",
+    "dynamics.impulses",
     "dynamics.watching",
     "dynamics.simulation",
     "dynamics.small_motion",

@@ -64,6 +64,19 @@ def test_rows_that_depend_on_each_other_have_a_solution(seed):
     assert abs(x @ rest) < 1e-9
 
 
+@pytest.mark.parametrize("seed", [4, 12, 58, 63])
+def test_more_rows_than_are_independent_do_not_contradict_each_other(seed):
+    """Gaps of which forces can close only some: what closes all of too many was told, with a gap far below zero."""
+    rng = np.random.default_rng(seed)
+    rows = rng.standard_normal((18, 6))
+    matrix, given = rows @ rows.T, np.maximum(rng.standard_normal(18), 0.0) + 5.0 * rows @ rng.standard_normal(6)
+    x = by_pivots(matrix, given)
+    rest = given + matrix @ x
+    # Rounding of numbers of the size of a hundred, of a matrix that has next to no more than six rows.
+    assert min(x.min(), rest.min()) > -1e-10
+    assert np.abs(x * rest).max() < 1e-8
+
+
 def test_of_two_solutions_the_one_to_which_the_change_leads_is_found():
     """What the second force yields to grows with itself: the gap there may stay open, or be closed by a push."""
     matrix, given = np.array([[1.0, 0.0], [3.0, -1.0]]), np.array([-1.0, -1.0])

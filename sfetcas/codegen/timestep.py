@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -12,8 +12,11 @@ import numpy as np
 
 from ..description.scene import Scene, check_scene
 from ..description.showing import shown
+from ..dynamics.impulses import Impulsive
+from ..dynamics.inertia import Inertia
 from ..dynamics.integrating import Memory, Stepper
 from ..dynamics.methods import Method
+from ..dynamics.motion import Mover
 from ..dynamics.simulation import INTEGRATORS, Simulation
 from ..dynamics.stages import StageEquations
 from ..dynamics.steps import LAST_CHANGE, step_function
@@ -23,6 +26,8 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
 from ..mechanics.masses import masses_of
 from ..mechanics.model import Model, assemble
+from ..mechanics.spots import spots_of
+from ..mechanics.unilateral import rows_of
 from ..parametric.arguments import Arguments, Asked, asked_for, in_words
 from ..parametric.equilibrium import Place, chosen_places
 from ..parametric.moving import ParametricStages, answers_of_motion, motion_of, parametric_stages
@@ -82,8 +87,20 @@ class TimeStep:
             "x": n.x,
             "rates": n.x * self.method.kept,
             "near": n.unwrapped,
+            "opening": self.openings,
             "last": 1,
         }
+
+    @property
+    def openings(self) -> int:
+        """How many numbers a state has of gaps and their rates."""
+        return self.method.openings(self.system) if isinstance(self.method, Impulsive) else 0
+
+    @functools.cached_property
+    def _step(self) -> ca.Function:
+        """A step of the method."""
+        method = self.method
+        return method.step(self.system) if isinstance(method, Impulsive) else step_function(self.system, method)
 
     @functools.cached_property
     def advance(self) -> ca.Function:
@@ -92,7 +109,7 @@ class TimeStep:
         Arguments are (numbers, times): a column for each of :attr:`times` of the step.
         """
         n, program = self.system.layout, self.arguments.program
-        step = step_function(self.system, self.method)
+        step = self._step
         state, h = ca.MX.sym("state", len(self.begin)), ca.MX.sym("h")
         p = ca.MX.sym("arguments", n.factors, len(self.times))
         parts = dict(zip(self.sizes, ca.vertsplit(state, np.cumsum([0, *self.sizes.values()]).tolist()), strict=True))
@@ -100,13 +117,16 @@ class TimeStep:
         # A fresh start has no step before it.
         ratio = ca.if_else(parts["last"] > 0.0, span / ca.fmax(parts["last"], 1e-300), 0.0)
         shaped = [ca.reshape(parts[name], *step.size_in(i)) for i, name in enumerate(list(parts)[:7])]
-        found = dict(zip(step.name_out(), step(*shaped, ratio, span, p, parts["near"]), strict=True))
+        given = [*shaped, ratio, span, p, parts["near"], *([parts["opening"]] if step.n_in() > 11 else [])]
+        found = dict(zip(step.name_out(), step(*given), strict=True))
         q = found["q_next"]
         lam = ca.reshape(found["lam_stages"], n.lam, self.method.stages)[:, -1]
         x = ca.reshape(found["x_stages"], n.x, self.method.stages)[:, -1]
         rest = [found["turns_stages"], found["shifts_stages"], x, found["rates_next"]]
-        unwrapped = program.counted(q, parts["near"])
-        after = ca.vertcat(ca.vec(q), found["y_next"], lam, *[ca.vec(part) for part in rest], unwrapped, span)
+        acting = found.get("acting", ca.MX(0, 1))
+        angles = parts["near"][: n.unwrapped - 2 * acting.numel()]
+        kept = [program.counted(q, angles), acting, ca.MX.zeros(acting.shape), found.get("opening_next", ca.MX(0, 1))]
+        after = ca.vertcat(ca.vec(q), found["y_next"], lam, *[ca.vec(part) for part in rest], *kept, span)
         results = [ca.densify(after), found["size"], found["iterations"], found["gap"]]
         names = ["after", "size", "iterations", "gap"]
         return ca.Function(f"{self.name}_advance", [state, h, p], results, ["state", "h", "arguments"], names)
@@ -119,7 +139,8 @@ class TimeStep:
         bounds = np.cumsum([0, *self.sizes.values()]).tolist()
         parts = dict(zip(self.sizes, ca.vertsplit(state, bounds), strict=True))
         velocity = ca.reshape(parts["rates"], layout.x, self.method.kept)[:, 0]
-        still = ca.vertcat(parts["q"], parts["y"], parts["lam"], parts["near"])
+        angles = parts["near"][: self.model.unwrapping.count]
+        still = ca.vertcat(parts["q"], parts["y"], parts["lam"], angles)
         outputs = answers_of_motion(self.results, self.arguments, self.system, self.time)
         as_given = outputs(still, p, velocity)
         return ca.Function(
@@ -175,17 +196,19 @@ def time_step(
         The scene or its integrator cannot be exported, or it does not have an argument or result that was asked for.
     """
     check_scene(scene, "export({}, ...)", steps=False)
-    simulation = motion_of(scene, settings or Settings())
+    simulation = motion_of(scene, settings or Settings(), touching=True)
     method = _method(simulation)
     scene = simulation.scene
     mesh = simulation.mesh if simulation.prescribed else simulation.mesh.refined()
+    mesh = replace(mesh, spots=spots_of(scene, mesh)) if scene.contacts else mesh
     base = assemble(scene, mesh, assembly="nodal")
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
     outputs = Results(base, results or default_motion_results(base), chosen_places(members, places or {}), motion=True)
     known = Arguments(scene, base, asked_for(scene, arguments), outputs, f"{name}_")
-    own = StageEquations(Equations(base), masses_of(base), "interpreted")
-    system = parametric_stages(known, own.masses)
-    begun, _ = simulation.begun(own)
+    own = StageEquations(Equations(base), masses_of(base), "interpreted", unilateral=rows_of(base))
+    system = parametric_stages(known, own.masses, own.unilateral)
+    mover = Mover(own.equations, Inertia(own), own.masses.time, own.factors)
+    begun, _ = simulation.begun(own, mover.free if len(own.unilateral) else None)
     rates = np.zeros((method.kept, len(begun.x)))
     rates[0] = begun.v
     state = begun.state
@@ -196,15 +219,22 @@ def time_step(
     stages, layout = method.stages, system.layout
     still = np.zeros(system.turns * layout.rotations * stages + layout.y * stages)
     moved = [memory.q.ravel(), memory.y, memory.lam, still, memory.x, memory.rates.ravel(), memory.unwrapped]
+    if isinstance(method, Impulsive):
+        moved += method.beginning(own, begun)
     return TimeStep(name, scene, known, outputs, system, method, own.masses.time, np.concatenate([*moved, np.zeros(1)]))
 
 
 def _method(simulation: Simulation) -> Method:
     """The integration method that a scene chooses; SceneError for one whose steps are those of a library."""
+    if simulation.name == Impulsive.name:
+        return Impulsive()
+    if simulation.scene.contacts:
+        message = f"found {simulation.name!r} with contact, accepted for C: {Impulsive.name}"
+        raise SceneError(message, ("analysis", "integrator"))
     made: Any = INTEGRATORS[simulation.name]
     method = getattr(made, "keywords", {}).get("method")
     if method is None:
-        accepted = ", ".join(n for n, one in INTEGRATORS.items() if hasattr(one, "keywords"))
+        accepted = ", ".join([*(n for n, one in INTEGRATORS.items() if hasattr(one, "keywords")), Impulsive.name])
         message = f"found {simulation.name!r}, whose steps are a library's own, accepted for C: {accepted}"
         raise SceneError(message, ("analysis", "integrator"))
     return method

@@ -193,7 +193,7 @@ motions.NAME.force | N | x y z | statics, motion, parameters | what makes a disp
 magnets.NAME.energy | J | | statics, motion, parameters | minus the moment times the field, summed along members
 magnets.NAME.torque | N m | x y z | statics, motion, parameters | of the fields, about the places of the magnet
 magnets.NAME.force | N | x y z | statics, motion, parameters | of fields that are not uniform
-contacts.NAME.force | N | x y z | statics, motion, parameters | on the member; in motions and with parameters the sum
+contacts.NAME.force | N | x y z | all | on the member; in motions and with parameters the sum
 contacts.NAME.at | | | statics, motion, parameters | fraction of the length, or [from, to]; in motions between members
 contacts.NAME.gap | m | | statics, motion | smallest distance
 contacts.NAME.member | | | statics, motion | which it touches; all are lists where it touches more than once

@@ -184,13 +184,8 @@ class StepEquations:
         system, n = self.system, self.system.layout
         q, y, v = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("v", n.x)
         factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
-        nothing, unknowns = ca.MX.zeros(n.lam), system.equations.unknowns
-        still, forces = ca.MX.zeros(n.x, 1), system.forces(ca.MX.zeros(n.x, 1), v)
-        moving, resting = (system.stage(q, y, nothing, part, factors, unwrapped) for part in (forces, still))
-        rows = system.static_matrix(resting)[unknowns:, :unknowns]
-        mass = system.coupling_matrix(resting, 0.0, 1.0)[:unknowns, :unknowns]
+        rows, mass, momentum = system.momenta(q, y, factors, unwrapped, v)
         matrix = ca.blockcat([[mass, rows.T], [rows, ca.MX(n.lam, n.lam)]])
-        momentum = (moving.residual - resting.residual)[:unknowns]
         function = ca.Function("momenta", [q, y, factors, unwrapped, v], [matrix, ca.densify(momentum)])
         return Batch(function, 1), Filled(function.sparsity_out(0))
 

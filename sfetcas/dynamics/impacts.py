@@ -53,14 +53,8 @@ class Impacts:
         system, n = self.system, self.system.layout
         q, y, v = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("v", n.x)
         factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
-        nothing = ca.MX.zeros(n.lam)
-        still, forces = ca.MX.zeros(n.x, 1), system.forces(ca.MX.zeros(n.x, 1), v)
-        moving, resting = (system.stage(q, y, nothing, part, factors, unwrapped) for part in (forces, still))
-        unknowns = system.equations.unknowns
-        rows = system.static_matrix(resting)[unknowns:, :unknowns]
-        mass = system.coupling_matrix(resting, 0.0, 1.0)[:unknowns, :unknowns]
-        found = [rows, mass, (moving.residual - resting.residual)[:unknowns]]
-        return ca.Function("momenta", [q, y, factors, unwrapped, v], found)
+        found = system.momenta(q, y, factors, unwrapped, v)
+        return ca.Function("momenta", [q, y, factors, unwrapped, v], list(found))
 
 
 class Collision:

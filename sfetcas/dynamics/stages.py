@@ -30,7 +30,7 @@ from ..mechanics.tables import Pattern
 from ..mechanics.terms import rotation_gradient
 from .system import System
 
-__all__ = ["StageEquations"]
+__all__ = ["DUAL_REGULARISATION", "StageEquations", "solution"]
 
 
 class StageEquations(System):
@@ -96,7 +96,7 @@ class StageEquations(System):
         """Solution of a system of all stages; what relaxes, which stands last, is eliminated first."""
         n, count = (self.total - len(self._relaxing)) * stages, len(self._relaxing)
         if not count:
-            return _solved(matrix, right)
+            return solution(matrix, right)
         # Each of these unknowns is coupled with itself alone, and with those of the elements.
         own = ca.Sparsity.dense(stages, stages)
         where = ca.diagcat(*[own] * count)
@@ -105,7 +105,7 @@ class StageEquations(System):
         inverse = ca.MX(where, ca.vec(_inverse(stages).map(count)(ca.reshape(entries, stages**2, count))))
         across, back = matrix[:n, n:], ca.mtimes(inverse, matrix[n:, :n])
         rest = ca.mtimes(inverse, right[n:])
-        first = _solved(matrix[:n, :n] - ca.mtimes(across, back), right[:n] - ca.mtimes(across, rest))
+        first = solution(matrix[:n, :n] - ca.mtimes(across, back), right[:n] - ca.mtimes(across, rest))
         return ca.vertcat(first, rest - ca.mtimes(back, first))
 
     @functools.cached_property
@@ -137,6 +137,17 @@ class StageEquations(System):
     def coupling_matrix(self, stage: _Stage, c: float, b: float) -> ca.MX:
         """Its derivative (total, total) where rates are multiplied by c and accelerations by b: ``c D + b M``."""
         return summed((self.total,) * 2, self._probe.coupled.places, stage.coupled(stage, ca.MX(c), ca.MX(b)))
+
+    def momenta(self, q: ca.MX, y: ca.MX, factors: ca.MX, unwrapped: ca.MX, v: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """Jacobian (rows, unknowns) of the rows, masses (unknowns, unknowns), and the momenta (unknowns,) of rates v
+        (quantities,) of the quantities.
+        """
+        nothing, unknowns = ca.MX.zeros(self.layout.lam), self.equations.unknowns
+        still, forces = ca.MX.zeros(self.layout.x, 1), self.forces(ca.MX.zeros(self.layout.x, 1), v)
+        moving, resting = (self.stage(q, y, nothing, part, factors, unwrapped) for part in (forces, still))
+        rows = self.static_matrix(resting)[unknowns:, :unknowns]
+        mass = self.coupling_matrix(resting, 0.0, 1.0)[:unknowns, :unknowns]
+        return rows, mass, (moving.residual - resting.residual)[:unknowns]
 
     @functools.cached_property
     def _probe(self) -> StagePlaces:
@@ -174,7 +185,8 @@ class StageEquations(System):
         return Pattern(found, sums, np.argsort(back).tolist(), back.tolist())
 
 
-def _solved(matrix: ca.MX, right: ca.MX) -> ca.MX:
+def solution(matrix: ca.MX, right: ca.MX) -> ca.MX:
+    """Of a linear system (n, n) with right sides (n, m)."""
     # Entries differ by the square of the step: none is too small to divide by.
     return ca.solve(matrix, right, "qr", {"eps": 1e-300})
 

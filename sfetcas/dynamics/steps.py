@@ -6,15 +6,16 @@ Newton's iterations are nested conditionals, so that a step ends when it has con
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
 
-from ..mechanics.expressions import moved_by
+from ..mechanics.expressions import Given, moved_by
 from .methods import Begin, Method
 from .stages import StageEquations
 
-__all__ = ["ITERATIONS", "LAST_CHANGE", "step_function"]
+__all__ = ["ITERATIONS", "LAST_CHANGE", "guessed", "repeated", "step_function"]
 
 ITERATIONS = 10
 """Iterations of Newton's method at most."""
@@ -40,15 +41,10 @@ def step_function(system: StageEquations, method: Method) -> ca.Function:
     ratio, h = ca.MX.sym("ratio"), ca.MX.sym("h")
     loads, unwrapped = ca.MX.sym("factors", n.factors, len(method.loaded)), ca.MX.sym("unwrapped", n.unwrapped)
     factors = loads[:, len(method.loaded) - s :]
-    onward = _onward(tuple(method.places))(ratio)
-    # Turns and shifts so far go on along the polynomials of the last step.
-    spins = ca.horzsplit(turns, n.rotations)
-    first = [sum((onward[i, j] * spins[j] for j in range(1, s)), onward[i, 0] * spins[0]) for i in range(s)]
     given = [system.given(factors[:, i]) for i in range(s)]
-    begin = [system.with_prescribed_rotations(moved_by(system, q, first[i]), given[i]) for i in range(s)]
-    guess = [ca.horzcat(*begin), ca.repmat(y, 1, s) + ca.mtimes(shifts, onward.T), ca.repmat(lam, 1, s)]
+    guess = [*guessed(system, method, q, y, turns, shifts, ratio, given), ca.repmat(lam, 1, s)]
     constants = method.constants(Begin(q, y, x, rates, unwrapped), h, loads)
-    newton = _newton(method.iteration(system), polished=method.polished)
+    newton = repeated(method.iteration(system), polished=method.polished)
     stages, moved, multipliers, size, count = newton(*guess, *constants)
     parts = ca.horzsplit(stages, n.rotations)
     there = ca.horzcat(*[system.moving(parts[i], moved[:, i], given[i], unwrapped) for i in range(s)])
@@ -82,23 +78,50 @@ def step_function(system: StageEquations, method: Method) -> ca.Function:
     return ca.Function("step", arguments, results, names, out)
 
 
-def _newton(iteration: ca.Function, *, polished: bool) -> ca.Function:
-    """Newton's method from a guess: ``(q, y, lam, constants) -> (q, y, lam, size, iterations)``."""
+def guessed(
+    system: StageEquations,
+    method: Method,
+    q: ca.MX,
+    y: ca.MX,
+    turns: ca.MX,
+    shifts: ca.MX,
+    ratio: ca.MX,
+    given: Sequence[Given],
+) -> list[ca.MX]:
+    """Rotations and displacements at the stages of a step: those so far go on along the polynomials of the last step.
+
+    Arguments as of :func:`step_function`; ``given`` is what is given at the stages.
+    """
+    n, s = system.layout, method.stages
+    onward = _onward(tuple(method.places))(ratio)
+    spins = ca.horzsplit(turns, n.rotations)
+    first = [sum((onward[i, j] * spins[j] for j in range(1, s)), onward[i, 0] * spins[0]) for i in range(s)]
+    begin = [system.with_prescribed_rotations(moved_by(system, q, first[i]), given[i]) for i in range(s)]
+    return [ca.horzcat(*begin), ca.repmat(y, 1, s) + ca.mtimes(shifts, onward.T)]
+
+
+def repeated(
+    iteration: ca.Function, *, changing: int = 3, most: int = ITERATIONS, polished: bool = False
+) -> ca.Function:
+    """A function that calls another one again and again, ``(x..., constants) -> (x..., size, iterations)``.
+
+    ``iteration`` gives the first ``changing`` of its arguments anew, and how much they have changed.  What has
+    converged, or gone beyond all numbers, ends; if ``polished`` one more iteration follows.
+    """
     symbols = [ca.MX.sym(iteration.name_in(i), iteration.sparsity_in(i)) for i in range(iteration.n_in())]
-    constants = symbols[3:]
+    x, constants = symbols[:changing], symbols[changing:]
     size, count = ca.MX.sym("size"), ca.MX.sym("count")
     arguments = [*symbols, size, count]
-    last = [*iteration(*symbols)[:3], size, count + 1] if polished else [*symbols[:3], size, count]
+    last = [*iteration(*symbols)[:changing], size, count + 1] if polished else [*x, size, count]
     end = ca.Function("end", arguments, last)
-    on = end
-    for level in range(ITERATIONS):
-        q, y, lam, change = iteration(*symbols)
-        # What has converged, or gone beyond all numbers, ends.
+    on, name = end, iteration.name()
+    for level in range(most):
+        *there, change = iteration(*symbols)
         going = ca.logic_and(change > LAST_CHANGE, change < LOST)
-        further = ca.Function.if_else(f"further_{level}", on, end)
-        found = further(going, q, y, lam, *constants, change, count + 1)
-        on = ca.Function(f"newton_{level}", arguments, list(found))
-    return ca.Function("newton", symbols, list(on(*symbols, 0.0, 0.0)))
+        further = ca.Function.if_else(f"further_{name}_{level}", on, end)
+        found = further(going, *there, *constants, change, count + 1)
+        on = ca.Function(f"repeated_{name}_{level}", arguments, list(found))
+    return ca.Function(f"repeated_{name}", symbols, list(on(*symbols, 0.0, 0.0)))
 
 
 LOST = 1e3

@@ -241,18 +241,18 @@ class System(Expressions):
         return ca.Function("rates", arguments, ca.substitute(both, [along], [ca.MX(0)]))
 
     @functools.cached_property
-    def _rates(self) -> ca.Function:
+    def along_step(self) -> ca.Function:
         """As of :meth:`_along` at factors that do not change."""
         return self._along(timed=False)
 
     @functools.cached_property
-    def _rates_in_time(self) -> ca.Function:
+    def along_step_in_time(self) -> ca.Function:
         """As of :meth:`_along` at factors that change."""
         return self._along(timed=True)
 
     def rates(self, state: State, factors: Array, step: Array) -> tuple[Array, Array]:
         """Quantities (quantities,) at a state, and their rates for the rates ``step`` (unknowns,) of the unknowns."""
-        x, v = self._rated(self.interpreted._rates, state, factors, step, np.zeros(self.layout.factors))
+        x, v = self._rated(self.interpreted.along_step, state, factors, step, np.zeros(self.layout.factors))
         return x, v
 
     def rates_in_time(
@@ -262,7 +262,7 @@ class System(Expressions):
 
         ``step`` (unknowns,) are rates of the unknowns, ``faster`` those of the factors.
         """
-        x, v, gaps, opening = self._rated(self.interpreted._rates_in_time, state, factors, step, faster)
+        x, v, gaps, opening = self._rated(self.interpreted.along_step_in_time, state, factors, step, faster)
         return x, v, gaps, opening
 
     def _rated(self, function: ca.Function, state: State, factors: Array, step: Array, faster: Array) -> list[Array]:

@@ -65,6 +65,10 @@ ROUNDING, FLAT = 1e-11, 1e-9
 column up to which a pivot is none.
 """
 
+CONTRADICTED = 1e-7
+"""Share of the largest number that is left of what is to be zero where rows contradict each other: far beyond rounding.
+"""
+
 SHY = 0.99
 """Share of the way to where a number would be zero that a step of the interior-point method goes."""
 
@@ -197,7 +201,9 @@ def _tried(matrix: Array, b: Array, chosen: Array) -> tuple[Array, Array]:
         x[chosen] = np.linalg.lstsq(matrix[np.ix_(chosen, chosen)], -b[chosen], rcond=None)[0]
         rest += matrix[:, chosen] @ x[chosen]
     size = np.abs(np.concatenate([x, rest, b])).max(initial=0.0)
-    return np.maximum(x, 0.0), np.where(chosen, x, rest) < -ROUNDING * size
+    # Of more rows than are independent no forces may close all.
+    wrong = (np.where(chosen, x, rest) < -ROUNDING * size) | (chosen & (np.abs(rest) > CONTRADICTED * size))
+    return np.maximum(x, 0.0), wrong
 
 
 def _by_single_pivots(matrix: Array, b: Array, back: Array | None = None, pivots: int = PIVOTS) -> Array | None:

@@ -6,6 +6,7 @@ They are terms as joints are, see :mod:`~sfetcas.mechanics.joints`.  All data ar
 from __future__ import annotations
 
 import abc
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, final
 
@@ -16,6 +17,9 @@ from ..mathematics.arrays import Array
 from .terms import Side, Term
 
 __all__ = ["Facing", "OnPlane", "OnRound", "Sticking", "directions_along"]
+
+PUSHED = {f"force {axis}": "N" for axis in "xyz"}
+"""What a place is told that lies on an obstacle."""
 
 CENTRE = 1e-60
 """Added to the square of a distance, dimensionless: below rounding wherever the distance is not itself nothing."""
@@ -61,6 +65,15 @@ class Facing(Term):
     def missed(self, u: Side, data: ca.SX) -> list[ca.SX]:
         """The rows for a displacement."""
 
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The force (3,) of the obstacle on the place, where there is one row."""
+        if not self.answers:
+            return []
+        at = [ca.SX.sym("u", self.axes), *map(ca.vcat, u[1:])]
+        row = ca.vcat(self.residual(q, [ca.vertsplit(one) for one in at], data, load))
+        force = -lam * ca.substitute(ca.gradient(row, at[0]), at[0], ca.vcat(u[0]))
+        return [*ca.vertsplit(force), *[ca.SX(0)] * (3 - self.axes)]
+
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """The rows."""
         if not self.carried:
@@ -78,6 +91,7 @@ class OnPlane(Facing):
     """A place lies on a plane; data: unit normal, gap in the undeformed scene."""
 
     on_face: ClassVar[bool] = True
+    answers: ClassVar[Mapping[str, str]] = PUSHED
 
     @property
     def rows(self) -> int:
@@ -100,6 +114,7 @@ class OnRound(Facing):
     """A place lies on a circle, cylinder or sphere; data: projection, centre to place, radius, sign."""
 
     on_face: ClassVar[bool] = True
+    answers: ClassVar[Mapping[str, str]] = PUSHED
 
     @property
     def rows(self) -> int:

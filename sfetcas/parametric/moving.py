@@ -15,6 +15,7 @@ from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..mechanics.expressions import Given
 from ..mechanics.masses import Masses, masses_of
+from ..mechanics.unilateral import NONE, UnilateralRows
 from .arguments import Arguments
 from .equilibrium import refuse_search
 from .results import Results
@@ -25,8 +26,8 @@ __all__ = ["ParametricStages", "answers_of_motion", "motion_of", "parametric_sta
 class ParametricStages(StageEquations):
     """The equations of motion whose ``factors`` are the values of arguments."""
 
-    def __init__(self, arguments: Arguments, masses: Masses) -> None:
-        super().__init__(arguments.expressions.equations, masses, "interpreted")
+    def __init__(self, arguments: Arguments, masses: Masses, unilateral: UnilateralRows = NONE) -> None:
+        super().__init__(arguments.expressions.equations, masses, "interpreted", unilateral=unilateral)
         self._arguments = arguments
         self.layout = replace(self.layout, factors=len(arguments.defaults))
 
@@ -35,20 +36,27 @@ class ParametricStages(StageEquations):
         return self._arguments.program.given_by(self._arguments.given(factors))
 
 
-def motion_of(scene: Scene, settings: Settings) -> Simulation:
-    """The dynamic analysis of a scene, not yet run.
+def motion_of(scene: Scene, settings: Settings, *, touching: bool = False) -> Simulation:
+    """The dynamic analysis of a scene, not yet run; ``touching`` if obstacles may stop members.
 
     Raises
     ------
     SceneError
         It needs a search that has no derivatives, or cannot be modelled.
     """
-    refuse_search(scene)
+    refuse_search(scene, touching=touching)
+    for name, contact in scene.contacts.items():
+        if contact.between_members:
+            message = (
+                "where members are near to each other is found by a search that is not exported, accepted: obstacles"
+            )
+            raise SceneError(message, ("contacts", name))
     return Simulation(scene, settings)
 
 
-def parametric_stages(arguments: Arguments, masses: Masses) -> ParametricStages:
-    """The equations of motion as a function of arguments; masses are those of their defaults.
+def parametric_stages(arguments: Arguments, masses: Masses, unilateral: UnilateralRows = NONE) -> ParametricStages:
+    """The equations of motion as a function of arguments; masses are those of their defaults, rows of obstacles those
+    that the model contains.
 
     Raises
     ------
@@ -58,7 +66,7 @@ def parametric_stages(arguments: Arguments, masses: Masses) -> ParametricStages:
     found = masses_of(arguments.model)
     if not _same(masses, found):
         raise SceneError("found numbers that change masses, accepted: loads, motions, stiffness", ("arguments",))
-    return ParametricStages(arguments, found)
+    return ParametricStages(arguments, found, unilateral)
 
 
 def answers_of_motion(results: Results, arguments: Arguments, system: ParametricStages, time: float) -> ca.Function:

@@ -103,11 +103,14 @@ def default_results(model: Model, *, unique: bool = True) -> list[str]:
 
 
 def default_motion_results(model: Model) -> list[str]:
-    """Default results of a motion: positions, rotations and velocities of nodes, positions along members, springs."""
+    """Default results of a motion: positions, rotations and velocities of nodes, positions along members, springs and
+    what obstacles do.
+    """
     every = [answer_name(name) for name in default_results(model, unique=False)]
     moving = [name.text for name in every if name.kind.table == "nodes" or name.kind.key == "position"]
     sprung = [name.text for name in every if name.kind.table == "springs" and name.kind.key in TRAVELS]
-    return [*moving, *(f"nodes.{name}.velocity" for name in model.nodes), *sprung]
+    pushed = [name.text for name in every if name.kind.table == "contacts"]
+    return [*moving, *(f"nodes.{name}.velocity" for name in model.nodes), *sprung, *pushed]
 
 
 TRAVELS = ("angle", "travel")
@@ -897,7 +900,12 @@ class Outputs:
         """The resultant of what a contact does, or where it touches at one place alone."""
         points = [point for point in self._model.mesh.points if point.contact == name]
         if key == "force":
-            return sum((self._force_at(point).T for point in points), ca.MX.zeros(1, 3))
+            stopped = [
+                ca.horzcat(*(self._told(number, i, each) for each in group.kind.answers))
+                for number, group in enumerate(self._model.terms)
+                for i in np.flatnonzero((np.array(group.names) == name) & group.kind.on_face).tolist()
+            ]
+            return sum([*(self._force_at(point).T for point in points), *stopped], ca.MX.zeros(1, 3))
         return self.place(points[0], 0) if len(points) == 1 else ca.MX(np.nan)
 
     def _force_at(self, point: ContactPoint) -> ca.MX:
