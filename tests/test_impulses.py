@@ -10,6 +10,7 @@ import pytest
 from scenes import made
 from test_codegen import built, needs_compiler, said
 from test_contact_motion import FLOOR, G, ball, rod
+from test_slack_motion import bob, string
 
 from sfetcas import SceneError, export, solve
 from sfetcas.codegen.timestep import time_step
@@ -80,6 +81,69 @@ def test_steps_are_those_of_the_simulation(name):
     # Both end Newton's method at 1e-9 in each of some hundred steps, whose errors impacts make larger.
     for node in scene.nodes:
         np.testing.assert_allclose(found[f"nodes.{node}.position"], last.position(node), atol=1e-7)
+
+
+STOPPED = {
+    "a string": (bob({"t": string(length=1.0)}, [0.6, 0.0], {}), 0.6),
+    "two strings": (bob({"t": string(length=1.0), "u": string((0.5, 0.2), length=0.8)}, [0.6, 0.0], {}), 0.5),
+    "a stop": (
+        {
+            **rod(0.0, 0.0, {}),
+            "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+            "springs": {"k": {"node": "A", "stiffness": 0.5, "stop": [-0.6, 0.3]}},
+            "contacts": {},
+        },
+        0.6,
+    ),
+    "a string and a floor": (
+        {
+            **bob({"t": string(length=1.0)}, [0.6, 0.0], {}),
+            "contacts": {"f": {**FLOOR, "point": [0, -0.9], "restitution": 0.4}},
+        },
+        0.6,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", list(STOPPED))
+def test_strings_and_stops_come_nearer_to_what_is_found_event_by_event(name):
+    """Where they act is somewhere in a step: errors fall as the step does, or faster; in C the steps are the same."""
+    table, end = STOPPED[name]
+    nodes = list(table["nodes"])
+    exact = solve(made({**table, "analysis": {"type": "dynamic", "end": end, "output": end, "accuracy": 1e-8}})).last
+    missed = []
+    for step in (0.01, 0.0025):
+        scene = stepped(table, step, end)
+        motion = solve(scene)
+        missed.append(max(np.abs(motion.last.position(node) - exact.position(node)).max() for node in nodes))
+        assert motion.last.energy["dissipated"] > 0.1
+    # Where nothing is left but the state at rest there is no error.
+    assert missed[1] < max(0.6 * missed[0], 1e-10)
+    assert missed[1] < 0.01
+    found = followed(scene)
+    for node in nodes:
+        np.testing.assert_allclose(found[f"nodes.{node}.position"], motion.last.position(node), atol=1e-9)
+
+
+def test_what_strings_take_is_dissipated():
+    """Energy and what is told as dissipated are the same in all steps; the string is told to act from where it does."""
+    table, end = STOPPED["a string"]
+    motion = solve(stepped(table, 0.01, end, output=0.05))
+    totals = [step.energy["total"] + step.energy["dissipated"] for step in motion.steps]
+    np.testing.assert_allclose(totals, totals[0], atol=1e-10)
+    (event,) = motion.events
+    assert (event.name, event.side, event.acts) == ("tendons.t", "taut", True)
+    assert 0.0 <= event.time - np.sqrt(2 * 0.8 / G) <= 0.01 + 1e-9
+    assert motion.last.tendon("t")["slack"] is False
+
+
+def test_strings_beside_friction_are_refused():
+    table, end = STOPPED["a string and a floor"]
+    table = {**table, "contacts": {"f": {**FLOOR, "point": [0, -0.9], "friction": 0.4}}}
+    with pytest.raises(
+        SceneError, match=r"tendons\.t: found beside contacts\.f with the integrator 'stepping', which does"
+    ):
+        stepped(table, 0.01, end)
 
 
 def test_a_floor_that_a_motion_raises():
@@ -157,12 +221,14 @@ def test_c_takes_these_steps(tmp_path):
         ({"integrator": "radau-3"}, "analysis.integrator: found 'radau-3' with contact, accepted for C: stepping"),
         ({"integrator": None}, "analysis.integrator: found 'radau-3' with contact, accepted for C: stepping"),
         ({"friction": 0.3}, "contacts.stop.friction: what sticks and slides depends on the steps before, and is not"),
+        ({"integrator": "radau-3", "stop": True}, "found 'radau-3' with stops, or tendons that may be slack, accepted"),
         ({"type": "members"}, "contacts.stop: where members are near to each other is found by a search"),
     ],
 )
 def test_what_is_not_exported(more, sentence, tmp_path):
     integrator = more.pop("integrator", "stepping")
-    table = ball({**FLOOR, **more}, [0, 1], {})
+    stopped = more.pop("stop", False)
+    table = STOPPED["a stop"][0] if stopped else ball({**FLOOR, **more}, [0, 1], {})
     if "type" in more:
         table["contacts"]["stop"] = {"type": "members", "members": "all", "radius": 0.01}
         table["nodes"] |= {"D": {"position": [1, 1], "mass": 1.0}, "E": {"position": [1, 2]}}

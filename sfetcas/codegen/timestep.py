@@ -196,7 +196,7 @@ def time_step(
         The scene or its integrator cannot be exported, or it does not have an argument or result that was asked for.
     """
     check_scene(scene, "export({}, ...)", steps=False)
-    simulation = motion_of(scene, settings or Settings(), touching=True)
+    simulation = motion_of(scene, settings or Settings(), one_sided=True)
     method = _method(simulation)
     scene = simulation.scene
     mesh = simulation.mesh if simulation.prescribed else simulation.mesh.refined()
@@ -228,8 +228,10 @@ def _method(simulation: Simulation) -> Method:
     """The integration method that a scene chooses; SceneError for one whose steps are those of a library."""
     if simulation.name == Impulsive.name:
         return Impulsive()
-    if simulation.scene.contacts:
-        message = f"found {simulation.name!r} with contact, accepted for C: {Impulsive.name}"
+    scene = simulation.scene
+    if scene.contacts or scene.stopped:
+        what = "contact" if scene.contacts else "stops, or tendons that may be slack"
+        message = f"found {simulation.name!r} with {what}, accepted for C: {Impulsive.name}"
         raise SceneError(message, ("analysis", "integrator"))
     made: Any = INTEGRATORS[simulation.name]
     method = getattr(made, "keywords", {}).get("method")

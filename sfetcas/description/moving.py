@@ -153,7 +153,12 @@ def _check_between(analysis: Analysis, name: str, contacts: Mapping[str, Contact
         raise SceneError(message, ("analysis", "initial"))
 
 
-def check_unilateral(analysis: Analysis, springs: Mapping[str, Spring], tendons: Mapping[str, Tendon]) -> None:
+def check_unilateral(
+    analysis: Analysis,
+    springs: Mapping[str, Spring],
+    tendons: Mapping[str, Tendon],
+    contacts: Mapping[str, Contact],
+) -> None:
     """Refuse stops and slack tendons with integrators that do not find when they act, or where friction hides it.
 
     Raises
@@ -165,10 +170,15 @@ def check_unilateral(analysis: Analysis, springs: Mapping[str, Spring], tendons:
         if tendon.may_be_slack and tendon.friction is not None:
             message = "found with a given length in a motion, which does not find when what slides is slack, accepted:"
             raise SceneError(f"{message} pushes = true, or a stiffness", ("tendons", name, "friction"))
-    if analysis.integrator not in ("idas", "conserving", "stepping"):
+    apart = [name for name, contact in contacts.items() if contact.friction > 0.0 or contact.between_members]
+    if analysis.integrator not in ("idas", "conserving", *(["stepping"] if apart else [])):
         return
-    found = f"found with the integrator {analysis.integrator!r}, which does not find when"
-    accepted = "accepted: radau-3, radau-2, generalised-alpha"
+    found, accepted = f"found with the integrator {analysis.integrator!r}, which does not find when", "accepted: "
+    if analysis.integrator == "stepping":
+        accepted += "obstacles without friction beside it"
+        found = f"found beside contacts.{apart[0]} {found.removeprefix('found ')}"
+    else:
+        accepted += "radau-3, radau-2, generalised-alpha, stepping"
     for name, spring in springs.items():
         if spring.stop is not None:
             raise SceneError(f"{found} it acts, {accepted}", ("springs", name, "stop"))

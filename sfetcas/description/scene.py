@@ -949,7 +949,7 @@ def _check_moving(scene: Scene) -> None:
     if analysis.type == "dynamic":
         tables = scene.contacts, scene.nodes, scene.members, scene.motions, scene.sections
         check_contact(analysis, *tables, scene.resolved_dimension == "space")
-        check_unilateral(analysis, scene.springs, scene.tendons)
+        check_unilateral(analysis, scene.springs, scene.tendons, scene.contacts)
         check_driving(analysis, scene.nodes, scene.members, scene.motions, scene.histories, scene.tendons)
 
 

@@ -22,13 +22,16 @@ import casadi as ca
 import numpy as np
 
 from ..mathematics.arrays import TINY, Array
+from ..mathematics.kernels import Batch
+from ..mechanics.equations import State
 from .conserving import Conserving, Middle, check_conserving, symbols_of_step
+from .coupling import Moving
 from .integrators import InitialState
 from .methods import Begin, Method
 from .stages import DUAL_REGULARISATION, StageEquations, solution
-from .steps import guessed, repeated
+from .steps import LAST_CHANGE, guessed, repeated
 
-__all__ = ["Impulsive"]
+__all__ = ["ImpulseStepper", "Impulsive"]
 
 ITERATIONS, ROUNDS, BLOCKS = 20, 60, 8
 """Iterations of Newton's method and rounds in each at most, and after how many rows change sides one by one."""
@@ -102,20 +105,18 @@ class Impulsive(Method):
 
     @staticmethod
     def openings(system: StageEquations) -> int:
-        """How many numbers a step passes on of gaps, and of rates of the unknowns, where any rebound."""
+        """How many numbers a step passes on of gaps and, where any rebounds, of rates of the unknowns."""
         rows = system.unilateral
-        return len(rows) + system.equations.unknowns if rows.restitution.any() else 0
+        return len(rows) + (system.equations.unknowns if rows.restitution.any() else 0)
 
     def beginning(self, system: StageEquations, begun: InitialState) -> list[Array]:
         """What a state has beside the angles that count turns where a motion begins."""
-        acting = begun.touching
-        if not self.openings(system):
-            return [acting, np.zeros(len(acting))]
-        return [acting, np.zeros(len(acting)), system.openings(begun.state, 0.0), begun.rates]
+        opening = np.concatenate([system.openings(begun.state, 0.0), begun.rates])[: self.openings(system)]
+        return [begun.touching, np.zeros(len(begun.touching)), opening]
 
     def step(self, system: StageEquations) -> ca.Function:
         """As of :func:`~sfetcas.dynamics.steps.step_function`, with gaps and rates of the unknowns, ``opening``, before
-        and after the step, and after it ``acting``, which rows push.
+        and after the step, and after it ``acting``, which rows push, and the energy that is ``lost``.
         """
         n = system.layout
         q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
@@ -136,7 +137,7 @@ class Impulsive(Method):
         missed = system.missed(rows, _with_acting(system, unwrapped, acting))
         impulses = _Impulses(system).function
         v = self.after(h, rates, x_next - x)
-        v, given, opening_next, failed = impulses(
+        v, given, opening_next, lost, failed = impulses(
             there, moved, unwrapped, factors, h, v, h * forces, acting, gaps, opening
         )
         told = ca.MX(lam_next)
@@ -155,10 +156,55 @@ class Impulsive(Method):
             "gap": _largest(missed),
             "acting": 1.0 * (given > 0.0),
             "opening_next": opening_next,
+            "lost": lost,
         }
         names = ["q", "y", "lam", "turns", "shifts", "x", "rates", "ratio", "h", "factors", "unwrapped", "opening"]
         arguments = [q, y, lam, turns, shifts, x, rates, ratio, h, factors, unwrapped, opening]
-        return ca.Function("step", arguments, list(results.values()), names, list(results))
+        return ca.Function("step", arguments, [ca.densify(one) for one in results.values()], names, list(results))
+
+
+class ImpulseStepper:
+    """Takes steps of a system in process; what one-sided rows are, strings and stops among them, are rows of its model.
+
+    Parameters
+    ----------
+    system : StageEquations
+    """
+
+    def __init__(self, system: StageEquations) -> None:
+        self.system, self._method = system, Impulsive()
+        self._function = self._method.step(system)
+        self._batch = Batch(self._function, 1)
+
+    def step(self, begin: Moving, h: float, factors: Array) -> Moving | None:
+        """The state after a step of length h with factors (2, groups) in its middle and at its end.
+
+        None where it has to be shorter.
+        """
+        system, n, state = self.system, self.system.layout, begin.state
+        parts = system.unilateral.parts
+        acting = np.array([float(part in begin.pushed) for part in parts])
+        opening = np.concatenate([system.openings(state, begin.t), begin.w])[: self._method.openings(system)]
+        still = np.zeros((n.rotations, system.turns)), np.zeros(n.y)
+        given = state.q, state.y, state.lam, *still, begin.x, begin.v, np.zeros(1), np.array([h]), factors
+        for i, values in enumerate((*given, system.counted(state, acting), opening)):
+            if values.size:
+                self._batch.set(i, values)
+        for result in self._batch.results:
+            result[...] = np.nan
+        parts_found = (part.ravel().copy() for part in self._batch())
+        found = dict(zip(self._function.name_out(), parts_found, strict=True))
+        if not (found["size"][0] <= LAST_CHANGE and np.isfinite(found["x_stages"]).all()):
+            return None
+        q, lam = found["q_next"].reshape(n.rotations, -1), found["lam_stages"]
+        unwrapping = system.model.unwrapping
+        unwrapped = unwrapping.angles(q, state.unwrapped) if unwrapping.count else state.unwrapped
+        impulses = h * system.unilateral.signs * lam[system.unilateral.rows]
+        pushed = {part: float(p) for part, p in zip(parts, impulses, strict=True) if p > 0.0}
+        w = np.concatenate([found["opening_next"][len(parts) :], np.zeros(system.total)])[: system.total]
+        after = State(q, found["y_next"], lam, unwrapped)
+        v, lost = found["rates_next"], begin.lost + float(found["lost"][0])
+        return Moving(begin.t + h, after, found["x_stages"], v, w, lost, pushed)
 
 
 class _Impulses:
@@ -170,12 +216,12 @@ class _Impulses:
 
     @functools.cached_property
     def function(self) -> ca.Function:
-        """``(q, y, unwrapped, factors, h, v, within, acting, gaps, opening) -> (v, given, opening, failed)``.
+        """``(q, y, unwrapped, factors, h, v, within, acting, gaps, opening) -> (v, given, opening, lost, failed)``.
 
         State, factors in the middle and at the end, length, and rates of the quantities at the end of a step; impulses
         (rows,) within it, which rows pushed, and gaps; gaps and rates of the unknowns at its begin.  Then rates of the
-        quantities, impulses of the whole step, gaps and rates of the unknowns at its end, and above 0 where none were
-        found.
+        quantities, impulses of the whole step, gaps and rates of the unknowns at its end, the energy that is lost, and
+        above 0 where none were found.
         """
         n, size = self.system.layout, self.count
         shapes = {
@@ -192,7 +238,9 @@ class _Impulses:
         }
         symbols = {name: ca.MX.sym(name, *shape) for name, shape in shapes.items()}
         given = list(symbols.values())
-        idle = ca.Function("idle", given, [symbols["v"], symbols["within"], symbols["opening"], ca.MX(0.0)])
+        opening = symbols["gaps"] if not self._restitution.any() else symbols["opening"]
+        none = ca.MX.zeros(size)
+        idle = ca.Function("idle", given, [symbols["v"], none, opening, ca.MX(0.0), ca.MX(0.0)])
         if not size:
             return idle
         found = ca.Function("hit", given, self._hit(**symbols))
@@ -231,18 +279,17 @@ class _Impulses:
         allowed, _, _ = one_sided.solved(masses, ca.vertcat(momentum, ca.MX.zeros(rows.shape[0])), none, none, SLOW)
         speeds = drifts - signs * ca.mtimes(rows, allowed[: self.unknowns])[which]
         closed = ca.fmax(acting, 1.0 * (gaps < INSIDE))
-        problem = _Impact(one_sided, masses, speeds, within, closed)
+        before, w = opening[: self.count], opening[self.count :]
+        problem = _Impact(one_sided, masses, speeds, within, closed, within / h * (gaps - before))
         if not self._restitution.any():
             step, given, failed = problem.solved(acting, none)
+            after = gaps
         else:
-            before, w = opening[: self.count], opening[self.count :]
             back = ca.DM(self._restitution) * ca.fmin(drifts - signs * ca.mtimes(rows, w)[which], 0.0) * closed
-            rebounds = problem.rebounds()
-            work = within / h * (gaps - before)
-            step, given, _, _, failed, _, _ = rebounds(nothing, none, back, 0.0, 0.0, *problem.data, acting, work)
+            step, given, _, _, failed, _, _ = problem.rebounds()(nothing, none, back, 0.0, 0.0, *problem.data, acting)
+            after = ca.vertcat(gaps, (allowed + step)[: self.unknowns])
         moved = system.interpreted.along_step(q, y, end, unwrapped, self._step(step), still)[1]
-        after = ca.vertcat(gaps, (allowed + step)[: self.unknowns]) if opening.numel() else opening
-        return [v + moved, given, after, failed]
+        return [v + moved, given, after, -ca.sum1(problem.gained(step, given)), failed]
 
     def _step(self, x: ca.MX) -> ca.MX:
         """Changes of the unknowns alone."""
@@ -259,8 +306,8 @@ class _Impulses:
 
 @dataclass(frozen=True, eq=False)
 class _Impact:
-    """Impulses along closed rows: masses with all rows, rates of gaps before them, impulses within the step, and which
-    rows are closed.
+    """Impulses along closed rows: masses with all rows, rates of gaps before them, impulses within the step, which rows
+    are closed, and the work that forces have done within the step.
     """
 
     one_sided: PushingRows
@@ -268,15 +315,16 @@ class _Impact:
     speeds: ca.MX
     within: ca.MX
     closed: ca.MX
+    work: ca.MX
 
     @property
-    def data(self) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
+    def data(self) -> tuple[ca.MX, ...]:
         """What changes from step to step."""
-        return self.masses, self.speeds, self.within, self.closed
+        return self.masses, self.speeds, self.within, self.closed, self.work
 
     def symbols(self) -> _Impact:
         """The same as symbols of a function."""
-        names = ("masses", "speeds", "within", "closed")
+        names = ("masses", "speeds", "within", "closed", "work")
         parts = (ca.MX.sym(name, part.sparsity()) for name, part in zip(names, self.data, strict=True))
         return _Impact(self.one_sided, *parts)
 
@@ -290,8 +338,9 @@ class _Impact:
         right = ca.mtimes(self.masses, given)
         right[own] = signs * (self.speeds + back)
         least = SLOW * ca.fmax(1.0, _largest(self.speeds))
-        x, _, failed = self.one_sided.solved(self.masses, right, acting, self.closed, least)
-        return x, signs * x[own], failed
+        x, pushing, failed = self.one_sided.solved(self.masses, right, acting, self.closed, least)
+        # What does not push does so with nothing, not with rounding.
+        return x, signs * x[own] * pushing, failed
 
     def opened(self, x: ca.MX) -> ca.MX:
         """What changes of velocities do to the rates of gaps (rows,)."""
@@ -299,24 +348,26 @@ class _Impact:
         unknowns[self.one_sided.own] = 0.0
         return -ca.DM(self.one_sided.signs) * ca.mtimes(self.masses, unknowns)[self.one_sided.own]
 
-    def rebounds(self) -> ca.Function:
-        """``(x, given, back, count, failed, data..., acting, work) -> (x, given, back, count, failed, size, tries)``:
-        what rebounds is halved where the energy of what touches each other would grow.
+    def gained(self, x: ca.MX, given: ca.MX) -> ca.MX:
+        """The energy that bodies gain by the forces and impulses of each row in the whole step."""
+        return self.work + 0.5 * (given - self.within) * (2.0 * self.speeds + self.opened(x))
 
-        ``work`` (rows,) is what forces have done within the step.
+    def rebounds(self) -> ca.Function:
+        """``(x, given, back, count, failed, data..., acting) -> (x, given, back, count, failed, size, tries)``: what
+        rebounds is halved where the energy of what touches each other would grow.
         """
         problem, n = self.symbols(), self.speeds.numel()
         back, count, failed = ca.MX.sym("back", n), ca.MX.sym("count"), ca.MX.sym("failed")
-        acting, work = ca.MX.sym("acting", n), ca.MX.sym("work", n)
+        acting, of_row = ca.MX.sym("acting", n), ca.DM(self._clusters())
         x, given, lost = problem.solved(acting, back)
-        change, of_row = given - problem.within, ca.DM(self._clusters())
-        gained = ca.mtimes(of_row, work + 0.5 * change * (2.0 * problem.speeds + problem.opened(x)))
-        size = ca.mtimes(of_row, ca.fabs(work) + ca.fabs(change * problem.speeds))
+        gained = ca.mtimes(of_row, problem.gained(x, given))
+        change = (given - problem.within) * problem.speeds
+        size = ca.mtimes(of_row, ca.fabs(problem.work) + ca.fabs(change))
         grows = ca.mtimes(of_row.T, 1.0 * (gained > GROWN * size)) * (back < 0.0)
         less = ca.if_else(count < HALVED, 0.5, 0.0)
         results = [x, given, ca.if_else(grows, less * back, back), count + 1.0, lost, _largest(grows)]
         changing = [ca.MX.sym("x", x.shape[0]), ca.MX.sym("given", n), back, count, failed]
-        once = ca.Function("rebound", [*changing, *problem.data, acting, work], results)
+        once = ca.Function("rebound", [*changing, *problem.data, acting], results)
         return repeated(once, changing=len(changing), most=HALVED + 2)
 
     def _clusters(self) -> Array:

@@ -177,8 +177,8 @@ class Simulation:
     def run(self, mesh: Mesh, rounds: int, before: int | None = None) -> MeshRun:
         """The motion on a mesh, after so many coarser runs, the last of which took so many steps."""
         begin = time.perf_counter()
-        # Steps with impulses know of contact without rows.
-        stepping = self.name == "stepping"
+        # Steps with impulses know of contact without rows, but beside strings and stops.
+        stepping = self.name == "stepping" and not self.scene.stopped
         if self.scene.contacts:
             mesh = replace(mesh, spots=() if stepping else spots_of(self.scene, mesh))
         model = assemble(self.scene, mesh, assembly="nodal")

@@ -53,6 +53,7 @@ from .conserving import check_conserving
 from .coupling import Bodies, Moving, StepEquations, factored
 from .events import Event
 from .gaps import Near, Pose, Rows, Touching
+from .impulses import ImpulseStepper
 from .inertia import Inertia
 from .integrators import InitialState, Integrator, TimeGrid
 from .sampling import Sample
@@ -151,6 +152,8 @@ class Stepping(Integrator):
     def __init__(self, system: StageEquations, progress: Callable[[float], Any] | None = None) -> None:
         super().__init__(system, progress)
         check_conserving(system, "stepping")
+        # Beside strings and stops obstacles are rows as these are.
+        self._rows = ImpulseStepper(system) if len(system.unilateral) else None
         self._equations, self._touching = StepEquations(system), Touching(system)
         self._inertia = Inertia(system)
         self._bodies = Bodies(self._equations.bodies)
@@ -190,14 +193,18 @@ class Stepping(Integrator):
 
     def _sample(self, at: Moving, before: Moving, after: Moving, h: float) -> Sample:
         """A state, with the mean accelerations and what touched in a step."""
-        parts = tuple(key for key in after.pushed)
         spin = self.system.equations.spins(at.w)
-        touched = tuple(self._part(key) for key in parts)
-        count = len(touched)
-        rows = UnilateralRows(touched, np.zeros(count, np.intp), -np.ones(count), np.zeros(count))
+        if self._rows is None:
+            touched = tuple(self._part(key) for key in after.pushed)
+            count = len(touched)
+            acting, nothing = np.ones(count), np.zeros(count)
+            rows = UnilateralRows(touched, np.zeros(count, np.intp), -acting, nothing)
+        else:
+            rows = self.system.unilateral
+            acting = np.array([float(part in after.pushed) for part in rows.parts])
         return Sample(
             at.t, at.state.q, at.state.y, at.x, at.v, (after.v - before.v) / h, spin, at.state.unwrapped,
-            acting=np.ones(count), lost=at.lost, unilateral=rows, dragged=after.dragged / h,
+            acting=acting, lost=at.lost, unilateral=rows, dragged=after.dragged / h,
             rubbed={key: (impulse / h, sticks) for key, (impulse, sticks) in after.rubbed.items()},
         )  # fmt: skip
 
@@ -211,8 +218,8 @@ class Stepping(Integrator):
             self.events.append(Event(after.t, self._part(key), True, after.pushed[key], lost))
         self.events += [Event(after.t, self._part(key), False, 0.0, 0.0) for key in ended]
 
-    def _part(self, key: Spot | Approach) -> Unilateral:
-        return Unilateral("contacts", key.contact, "touching", key)
+    def _part(self, key: Spot | Approach | Unilateral) -> Unilateral:
+        return key if isinstance(key, Unilateral) else Unilateral("contacts", key.contact, "touching", key)
 
     # -- one step -------------------------------------------------------------------------------------
 
@@ -247,6 +254,8 @@ class Stepping(Integrator):
 
     def _step(self, begin: Moving, h: float) -> Moving | None:
         """The state after a step; None where it has to be shorter."""
+        if self._rows is not None:
+            return self._rows.step(begin, h, self._factors(begin.t, h))
         touching, longest = self._touching, STRIDE * self._touching.distance
         if (stride := self._farthest(h * begin.v)) > longest:
             return None
@@ -620,6 +629,6 @@ def _add_rubbed(found: dict[Any, tuple[Array, bool]], more: Mapping[Any, tuple[A
         found[key] = (impulse, sticks) if before is None else (before[0] + impulse, before[1] and sticks)
 
 
-def _owner(key: Spot | Approach) -> object:
+def _owner(key: Spot | Approach | Unilateral) -> object:
     """What touches, wherever along its members."""
-    return key if isinstance(key, Spot) else (key.contact, key.members)
+    return (key.contact, key.members) if isinstance(key, Approach) else key

@@ -342,11 +342,17 @@ NOT_UNIQUE = "reactions are not unique"
 
 
 def refuse_search(
-    scene: Scene, lacking: str = "not exported", *, stopped: bool = False, touching: bool = False
+    scene: Scene,
+    lacking: str = "not exported",
+    *,
+    stopped: bool = False,
+    touching: bool = False,
+    moving: bool = False,
 ) -> None:
     """Refuse a scene whose equilibrium needs a search (contacts, stops, ...), which is not exported, or is ``lacking``.
 
-    With ``stopped`` what is taut and at a stop may have to be found, with ``touching`` what touches.
+    With ``stopped`` what is taut and at a stop may have to be found, with ``touching`` what touches; ``moving`` if that
+    is not for an equilibrium but in steps of a motion.
 
     Raises
     ------
@@ -360,7 +366,10 @@ def refuse_search(
         if contact.friction > 0.0:
             message = f"what sticks and slides depends on the steps before, and is {lacking}, accepted: 0"
             raise SceneError(message, ("contacts", name, "friction"))
-        if scene.stopped:
+        if contact.between_members and moving:
+            message = f"where members are near to each other is found by a search that is {lacking}"
+            raise SceneError(f"{message}, accepted: obstacles", ("contacts", name))
+        if scene.stopped and not moving:
             message = f"what touches beside stops or tendons that may be slack is {lacking}, accepted: one of these"
             raise SceneError(message, ("contacts", name))
     for name, spring in scene.springs.items():

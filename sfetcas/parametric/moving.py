@@ -36,21 +36,15 @@ class ParametricStages(StageEquations):
         return self._arguments.program.given_by(self._arguments.given(factors))
 
 
-def motion_of(scene: Scene, settings: Settings, *, touching: bool = False) -> Simulation:
-    """The dynamic analysis of a scene, not yet run; ``touching`` if obstacles may stop members.
+def motion_of(scene: Scene, settings: Settings, *, one_sided: bool = False) -> Simulation:
+    """The dynamic analysis of a scene, not yet run; ``one_sided`` if what stops members may have to be found.
 
     Raises
     ------
     SceneError
         It needs a search that has no derivatives, or cannot be modelled.
     """
-    refuse_search(scene, touching=touching)
-    for name, contact in scene.contacts.items():
-        if contact.between_members:
-            message = (
-                "where members are near to each other is found by a search that is not exported, accepted: obstacles"
-            )
-            raise SceneError(message, ("contacts", name))
+    refuse_search(scene, stopped=one_sided, touching=one_sided, moving=True)
     return Simulation(scene, settings)
 
 
