@@ -65,6 +65,7 @@ SCENES = {
     "a rod rebounds end by end": (rod(0.6, 0.45, {}, restitution=0.7), 0.005, 1.0),
     "a soft rod": (rod(0.3, 0.2, {}, kind="flexible"), 0.002, 0.3),
     "in space": ({**rod(0.3, 0.1, {}, kind="flexible", restitution=0.7), "dimension": "space"}, 0.002, 0.2),
+    "energy that would grow": (rod(0.6, 0.2, {}, restitution=1.0), 0.01, 0.8),
     "in a bowl": (ball(BOWL, [-0.8, -0.6], {}, out=(0.8, 0.6)), 0.01, 0.5),
     "wedged": (wedged(), 0.004, 0.5),
     "on a hinge": (on_hinge(0.0), 0.005, 0.4),
@@ -160,6 +161,8 @@ def test_a_floor_that_a_motion_raises():
     assert last.position("A")[1] > 0.05
     for node in "AB":
         np.testing.assert_allclose(found[f"nodes.{node}.position"], last.position(node), atol=1e-9)
+        # The rate of the motion is that of the second half of a step: a quarter of a step before.
+        assert found[f"nodes.{node}.velocity"][1] == pytest.approx(history.rate(0.5 - 0.005 / 4), rel=1e-3)
 
 
 def test_numbers_of_an_obstacle_are_arguments():

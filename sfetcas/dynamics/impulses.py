@@ -39,7 +39,7 @@ ITERATIONS, ROUNDS, BLOCKS = 20, 60, 8
 TURNED = 1.0
 """Rotation in a step, rad, beyond which it is not taken: far from where it begins there are other solutions."""
 
-HALVED = 8
+HALVED = 30
 """How often the restitution of what touches each other is halved before it is taken to be zero."""
 
 INSIDE, MISSED = 1e-10, 1e-8
