@@ -201,11 +201,33 @@ def test_energy_never_grows():
     assert energies[0] - energies[-1] > 1.0
 
 
+def test_tendons_that_stretch_may_be_beside_obstacles():
+    """What pulls at once is asked for before the first step."""
+    table = rod(0.1, 0.02, {}, kind="flexible")
+    table["nodes"]["A"] |= {"position": [0, 0.05], "support": "clamped"}
+    table["tendons"] = {"t": {"way": [{"ground": [0, 1]}, {"node": "B"}], "length": 1.41, "stiffness": 100.0}}
+    scene = stepped(table, 0.005, 0.2)
+    np.testing.assert_allclose(followed(scene)["nodes.B.position"], solve(scene).last.position("B"), atol=1e-9)
+
+
+def test_ranges_and_radii_of_arguments_are_kept():
+    scene = stepped(ball({**LOG, "friction": 0.0}, [0.3, 1.0], {}), 0.01, 0.1)
+    made_with = time_step(scene, "motion", arguments={"contacts.stop.radius": (0.2, 0.4)})
+    assert np.isfinite(made_with.step(made_with.begin, 0.01, [0.4])).all()
+    assert np.isnan(made_with.step(made_with.begin, 0.01, [0.41])).all()
+    free = time_step(scene, "motion", arguments=["contacts.stop.radius"])
+    assert np.isfinite(free.step(free.begin, 0.01, [0.41])).all()
+    assert np.isnan(free.step(free.begin, 0.01, [0.0])).all()
+    with pytest.raises(SceneError, match="found what impacts have of the scene, accepted: another number"):
+        time_step(scene, "motion", arguments=["contacts.stop.restitution"])
+
+
 @needs_compiler
 def test_c_takes_these_steps(tmp_path):
     """To the last bit, with impacts and rest among the first steps."""
     table = rod(0.1, 0.02, {}, kind="flexible", restitution=0.3)
-    made = export(stepped(table, 0.01, 0.3), tmp_path / "c", name="motion")
+    ranges = {"gravity.1": (-10.5, -9.5)}
+    made = export(stepped(table, 0.01, 0.3), tmp_path / "c", name="motion", arguments=ranges)
     assert "10 of 10 steps agree, 10 of them to the last bit" in said(built(tmp_path / "c", "motion"))
     text = "import motion\nm = motion.Motion()\nfor _ in range(30): print(*m.step(0.01)['contacts.floor.force'])"
     subprocess.run(["make", "libmotion.so"], cwd=tmp_path / "c", check=True, capture_output=True)
@@ -216,6 +238,9 @@ def test_c_takes_these_steps(tmp_path):
         forces.append(made.outputs(state)[-3:].tolist())
     assert [[float(x) for x in line.split()] for line in run.stdout.splitlines()] == forces
     assert np.max(forces) > 2.0 * G
+    text = "import motion\nm = motion.Motion()\nprint(m.step(0.01, {'gravity.1': -11.0})['message'])"
+    run = subprocess.run([sys.executable, "-c", text], cwd=tmp_path / "c", capture_output=True, text=True, check=True)
+    assert "an argument outside of its range" in run.stdout
 
 
 @pytest.mark.parametrize(

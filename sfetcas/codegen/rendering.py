@@ -15,7 +15,7 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..mathematics.arrays import Array
-from ..mathematics.source import functions_in_c, sizes_of
+from ..mathematics.source import functions_in_c, sizes_of, table
 from ..mechanics.model import Model
 from ..parametric.arguments import Arguments
 from ..parametric.results import Results
@@ -157,6 +157,16 @@ class Writer(abc.ABC):
     def model(self) -> Model:
         """The model on which the functions are based."""
         return self.arguments.model
+
+    @property
+    def limits(self) -> Array:
+        """Least and largest accepted values of all numbers among the arguments, (2, numbers)."""
+        return np.array([one.limits for one in self.arguments.arguments for _ in one.default]).reshape(-1, 2).T
+
+    @property
+    def ranges(self) -> list[str]:
+        """These as tables in C."""
+        return [table(name, values) for name, values in zip(("sf_low", "sf_high"), self.limits, strict=True)]
 
     @property
     def where(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,7 +16,7 @@ from ..description.showing import shown
 from ..dynamics.impulses import Impulsive
 from ..dynamics.inertia import Inertia
 from ..dynamics.integrating import Memory, Stepper
-from ..dynamics.methods import Method
+from ..dynamics.methods import Method, Radau
 from ..dynamics.motion import Mover
 from ..dynamics.simulation import INTEGRATORS, Simulation
 from ..dynamics.stages import StageEquations
@@ -34,6 +35,10 @@ from ..parametric.moving import ParametricStages, answers_of_motion, motion_of, 
 from ..parametric.results import Results, default_motion_results
 
 __all__ = ["TimeStep", "time_step"]
+
+
+IMPACT = re.compile(r"contacts\..+\.(restitution|friction)")
+"""Numbers that are no arguments of a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +158,9 @@ class TimeStep:
         return np.asarray(self.method.loaded)
 
     def step(self, state: Array, h: float, arguments: Array | None = None) -> Array:
-        """The state (states,) after a step of h, s; nan if Newton's method did not converge.
+        """The state (states,) after a step of h, s.
+
+        It is nan if Newton's method did not converge, or arguments are outside of their ranges.
 
         Parameters
         ----------
@@ -164,6 +171,8 @@ class TimeStep:
         """
         p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
         p = np.broadcast_to(p, (len(self.times), self.arguments.defaults.size))
+        if not all(map(self.arguments.accepted, p)):
+            return np.full(len(state), np.nan)
         after, size, _, _ = (np.array(part).ravel() for part in self.advance(state, h, p.T))
         good = size[0] <= LAST_CHANGE and np.isfinite(after).all()
         return after if good else np.full(len(state), np.nan)
@@ -204,7 +213,11 @@ def time_step(
     base = assemble(scene, mesh, assembly="nodal")
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
     outputs = Results(base, results or default_motion_results(base), chosen_places(members, places or {}), motion=True)
-    known = Arguments(scene, base, asked_for(scene, arguments), outputs, f"{name}_")
+    asked = asked_for(scene, arguments)
+    for one in asked:
+        if IMPACT.fullmatch(one.name):
+            raise SceneError("found what impacts have of the scene, accepted: another number", ("arguments", one.name))
+    known = Arguments(scene, base, asked, outputs, f"{name}_")
     own = StageEquations(Equations(base), masses_of(base), "interpreted", unilateral=rows_of(base))
     system = parametric_stages(known, own.masses, own.unilateral)
     mover = Mover(own.equations, Inertia(own), own.masses.time, own.factors)
@@ -212,10 +225,13 @@ def time_step(
     rates = np.zeros((method.kept, len(begun.x)))
     rates[0] = begun.v
     state = begun.state
-    memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.unwrapped)
+    given = state.q, state.y, state.lam, begun.x, rates, state.unwrapped
+    memory = Memory(0.0, *given, acting=begun.touching, held=0.0 * begun.touching)
     if method.kept > 1 or base.segments.pulled:
         step = scene.analysis.step or scene.analysis.duration / 1000.0
-        memory = Stepper(own, method).refreshed(memory, step / own.masses.time)
+        # How tendons pull at once is asked of a method that knows which rows act.
+        stepper = Stepper(own, Radau(2) if isinstance(method, Impulsive) else method)
+        memory = stepper.refreshed(memory, step / own.masses.time)
     stages, layout = method.stages, system.layout
     still = np.zeros(system.turns * layout.rotations * stages + layout.y * stages)
     moved = [memory.q.ravel(), memory.y, memory.lam, still, memory.x, memory.rates.ravel(), memory.unwrapped]

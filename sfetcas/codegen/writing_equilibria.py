@@ -118,10 +118,6 @@ class EquilibriumWriter(Writer):
         return found, list(order)
 
     @property
-    def _limits(self) -> list[tuple[float, float]]:
-        return [one.limits for one in self.arguments.arguments for _ in one.default]
-
-    @property
     def tables(self) -> list[str]:
         """Sizes, rules of the method, ranges of arguments, start, and patterns of the matrix."""
         solver, program = self.solver, self.arguments.program
@@ -152,8 +148,7 @@ class EquilibriumWriter(Writer):
         }
         found = [
             "\n".join(f"#define SF_{key} {value!r}" for key, value in constants.items()) + "\n",
-            table("sf_low", np.array([low for low, _ in self._limits])),
-            table("sf_high", np.array([high for _, high in self._limits])),
+            *self.ranges,
             table("sf_diagonal", solver.method.diagonal, "int"),
             table("sf_mass", solver.method.mass),
             table("sf_soft", solver.method.soft),
@@ -180,8 +175,7 @@ class EquilibriumWriter(Writer):
         chosen = [base]
         for step in self.scene.analysis.steps[:-1][:4]:
             chosen.append(np.array([step if n == "factor" else x for n, x in zip(names, base, strict=True)]))
-        low, high = np.array(self._limits).reshape(-1, 2).T
-        chosen += [np.clip(base * (1.0 + shift), low, high) for shift in (0.03, -0.07)]
+        chosen += [np.clip(base * (1.0 + shift), *self.limits) for shift in (0.03, -0.07)]
         solved = [solver.solve(case) for case in chosen]
         results = [result for _, result in solved]
         return {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from ..description.records import counted
 from ..dynamics.steps import LAST_CHANGE
@@ -20,7 +21,7 @@ DONE = (
     (
         "BAD_ARGUMENT",
         2,
-        "no step: its length is not positive, or an argument or the state not a finite number",
+        "no step: its length is not positive, an argument outside of its range, or the state not a finite number",
     ),
 )
 """Result codes of a step: name, number, meaning."""
@@ -109,7 +110,12 @@ class StepWriter(Writer):
     def tables(self) -> list[str]:
         """The first state, the times within a step at which arguments are needed, and the limit of convergence."""
         converged = f"#define SF_CONVERGED {LAST_CHANGE!r}\n"
-        return [converged, table("sf_begin", self.step.begin), table("sf_times", self.step.times)]
+        return [
+            converged,
+            *self.ranges,
+            table("sf_begin", self.step.begin),
+            table("sf_times", self.step.times),
+        ]
 
     @property
     def cases(self) -> dict[str, object]:
@@ -118,7 +124,7 @@ class StepWriter(Writer):
         arguments, results = [], []
         for number in range(CHECKED):
             shares = 1.0 + 0.01 * (number + step.times)
-            p = shares[:, None] * self.arguments.defaults
+            p = np.clip(shares[:, None] * self.arguments.defaults, *self.limits)
             state = step.step(state, self.usual, p)
             arguments.append(p.ravel())
             results.append(step.outputs(state, p[-1]))

@@ -20,23 +20,31 @@ Touch = tuple[Near, Array, Array, bool]
 """Where members touch, the forces (3,) across and along the surfaces on the first one, N, and whether it sticks."""
 
 
-def push_at(fields: Fields, spot: Spot) -> Array:
-    """Force (3,) of an obstacle on a member at a place where it stops it in a motion, across it, N."""
+def push_at(fields: Fields, spot: Spot, force: float | None = None) -> Array:
+    """Force (3,) of an obstacle on a member at a place where it stops it in a motion, across it, N.
+
+    ``force`` is how large it is, by default what balances the state.
+    """
     at, model = np.array([spot.at]), fields.model
     normal = fields.obstacle(spot.contact).normals(fields.positions(spot.member, at), fields.tangents(spot.member, at))
-    return np.asarray(-fields.state.lam[model.row_names.index(spot.name)] * normal[0] * model.scales.force)
+    force = -float(fields.state.lam[model.row_names.index(spot.name)]) * model.scales.force if force is None else force
+    return np.asarray(force * normal[0])
 
 
 def pressed(
-    fields: Fields, contacts: Sequence[str], friction: Mapping[str | Approach, tuple[Array, bool]]
+    fields: Fields,
+    contacts: Sequence[str],
+    friction: Mapping[str | Approach, tuple[Array, bool]],
+    pushed: Mapping[str | Approach, float],
 ) -> dict[str, dict[str, Any]]:
     """For each contact between members what :func:`~sfetcas.contact.closest.answers` gives.
 
-    ``friction`` has, for approaches, the force (3,) of friction on the first member, N, and whether it sticks.
+    ``friction`` has, for approaches, the force (3,) of friction on the first member, N, and whether it sticks;
+    ``pushed`` that across surfaces, N, where it is not what balances the state.
     """
     scene, found = fields.model.scene, dict[str, dict[str, Any]]()
     closest = Closest(scene)
-    touches = _once_each(closest, _touches(fields, friction))
+    touches = _once_each(closest, _touches(fields, friction, pushed))
     for name in contacts:
         contact = scene.contacts[name]
         own = list[dict[str, Any]]()
@@ -58,7 +66,9 @@ def pressed(
     return found
 
 
-def _touches(fields: Fields, friction: Mapping[str | Approach, tuple[Array, bool]]) -> list[Touch]:
+def _touches(
+    fields: Fields, friction: Mapping[str | Approach, tuple[Array, bool]], pushed: Mapping[str | Approach, float]
+) -> list[Touch]:
     """Where members touch, as approaches have it."""
     model, found = fields.model, list[Touch]()
     number = {name: i for i, name in enumerate(model.row_names)}
@@ -72,7 +82,8 @@ def _touches(fields: Fields, friction: Mapping[str | Approach, tuple[Array, bool
             )
             apart = float(np.linalg.norm(one - other))
             normal = (one - other) / apart
-            across = -fields.state.lam[number[near.name]] * normal * model.scales.force
+            force = pushed.get(near, -float(fields.state.lam[number[near.name]]) * model.scales.force)
+            across = force * normal
             place = Near(near.contact, near.members, (one_at, other_at), normal, apart - near.distance, near.distance)
             found.append((place, across, *friction.get(near, (np.zeros(3), False))))
     return found

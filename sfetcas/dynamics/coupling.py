@@ -19,10 +19,15 @@ from ..mechanics.equations import State
 from .conserving import Middle, symbols_of_step
 from .stages import StageEquations
 
-__all__ = ["Bodies", "Moving", "StepEquations", "factored"]
+__all__ = ["MASSLESS", "SOFT", "Bodies", "Moving", "StepEquations", "factored"]
 
-DUAL, MASSLESS, REFINED = 1e-10, 1e-14, 2
-"""Diagonals of rows and masses over the largest mass in the matrix of impulses, and rounds that take the first out."""
+DUAL, REFINED = 1e-10, 2
+"""Diagonal of rows over the largest mass in the matrix of impulses, and rounds that take it out."""
+
+MASSLESS, SOFT = 1e-14, 1e-13
+"""Share of the largest mass, or largest entry of a matrix, that everything has at least, and share of its own by which
+anything is heavier: some combinations of unknowns have no mass.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +46,8 @@ class Moving:
         Energy that contact has taken so far.
     pushed : mapping
         For what has touched in the step before its impulse.
+    length : float
+        The length of that step; of one that was divided that of its last part.
     rubbed : mapping
         For what has rubbed in it the impulse (axes,) of friction on it, or on the first member, and whether it sticks.
     dragged : ndarray (full,)
@@ -54,6 +61,7 @@ class Moving:
     w: Array
     lost: float = 0.0
     pushed: dict[Any, float] = field(default_factory=dict)
+    length: float = 1.0
     rubbed: dict[Any, tuple[Array, bool]] = field(default_factory=dict)
     dragged: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -206,7 +214,8 @@ class StepEquations:
         matrix, momenta = self._massive(now, factors, v)
         unknowns, size = self.system.equations.unknowns, self.system.total
         largest = float(np.abs(matrix.diagonal()[:unknowns]).max(initial=TINY))
-        soft = np.repeat([MASSLESS * largest, 0.0], [unknowns, size - unknowns])
+        own = matrix.diagonal()[:unknowns]
+        soft = np.append(np.maximum(MASSLESS * largest - own, SOFT * own), np.zeros(size - unknowns))
         whole = (matrix + diags(soft)).tocsc()
         own = splu((whole - diags(np.repeat([0.0, DUAL / largest], [unknowns, size - unknowns]))).tocsc())
 

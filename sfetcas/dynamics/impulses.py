@@ -25,13 +25,13 @@ from ..mathematics.arrays import TINY, Array
 from ..mathematics.kernels import Batch
 from ..mechanics.equations import State
 from .conserving import Conserving, Middle, check_conserving, symbols_of_step
-from .coupling import Moving
+from .coupling import MASSLESS, SOFT, Moving
 from .integrators import InitialState
 from .methods import Begin, Method
 from .stages import DUAL_REGULARISATION, StageEquations, solution
 from .steps import LAST_CHANGE, guessed, repeated
 
-__all__ = ["ImpulseStepper", "Impulsive"]
+__all__ = ["TURNED", "ImpulseStepper", "Impulsive"]
 
 ITERATIONS, ROUNDS, BLOCKS = 20, 60, 8
 """Iterations of Newton's method and rounds in each at most, and after how many rows change sides one by one."""
@@ -52,11 +52,8 @@ PULLS, SLOW = 1e-9, 1e-9
 largest, up to which a gap stays closed.
 """
 
-GROWN = 1e-12
-"""Share of the energy that an impact moves by which it may grow: rounding."""
-
-MASSLESS = 1e-14
-"""Share of the largest mass that everything has."""
+GROWN = 1e-9
+"""Share of the energy that an impact moves by which it may grow: beyond rounding, also where masses differ."""
 
 
 @final
@@ -81,7 +78,7 @@ class Impulsive(Method):
         every = replace(begin, unwrapped=_with_acting(system, begin.unwrapped, ca.MX.ones(acting.shape)))
         matrix, order = system.matrix(found.entries, [2.0 / h**2], every.unwrapped)
         soft = ca.diag(ca.DM((np.array(order.order) < n).astype(float)))
-        matrix += MASSLESS * 2.0 / h**2 * soft
+        matrix += MASSLESS * ca.norm_inf(soft @ ca.diag(matrix)) * soft
         own = [order.back[n + row] for row in system.unilateral.rows.tolist()]
         given = ca.MX.zeros(system.total)
         given[own] = lam[system.unilateral.rows.tolist()]
@@ -299,7 +296,8 @@ class _Impulses:
     def _matrix(mass: ca.MX, rows: ca.MX) -> ca.MX:
         """Masses and rows, with a little of what makes them independent."""
         largest = ca.fmax(ca.norm_inf(ca.diag(mass)), TINY)
-        soft = MASSLESS * largest * ca.MX(ca.DM.eye(mass.shape[0]))
+        own = ca.diag(mass)
+        soft = ca.diag(ca.fmax(MASSLESS * largest - own, SOFT * own))
         dual = DUAL_REGULARISATION / largest * ca.MX(ca.DM.eye(rows.shape[0]))
         return ca.vertcat(ca.horzcat(mass + soft, rows.T), ca.horzcat(rows, -dual))
 

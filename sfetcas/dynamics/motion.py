@@ -257,7 +257,7 @@ class MotionState(Configuration):
             return {}
         closest, found = Closest(scene), dict[str, dict[str, Any]]()
         between = [name for name, one in scene.contacts.items() if one.between_members]
-        found |= pressed(self.fields, between, self.friction) if between else {}
+        found |= pressed(self.fields, between, self.friction, self._pushed) if between else {}
         for name in scene.obstacles:
             force = sum((force for _, _, force in self.pushes(name)), np.zeros(3))
             spots = [spot for spot in model.mesh.spots or () if spot.contact == name]
@@ -274,9 +274,19 @@ class MotionState(Configuration):
         spots = [spot for spot in self.model.mesh.spots or () if spot.contact == contact]
         nothing = np.zeros(3), False
         return [
-            (spot.member, spot.at, push_at(self.fields, spot) + self.friction.get(spot.name, nothing)[0])
+            (
+                spot.member,
+                spot.at,
+                push_at(self.fields, spot, self._pushed.get(spot.name)) + self.friction.get(spot.name, nothing)[0],
+            )
             for spot in spots
         ]
+
+    @functools.cached_property
+    def _pushed(self) -> dict[str | Approach, float]:
+        """Of spots, by name, and approaches the forces across surfaces, N, where steps tell them."""
+        unit, told = self.model.scales.force, self.sample.pushed.items()
+        return {key.name if isinstance(key, Spot) else key: unit * force for key, force in told if key is not None}
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
         """As :meth:`.Configuration.table`; also for the kinds ``energy`` and ``momentum``."""

@@ -67,6 +67,9 @@ class Sample:
         Forces of all friction by full coordinates, where they are told; else empty.
     rubbed : mapping
         For the spots and approaches of these the force (axes,) of friction, and whether it sticks.
+    pushed : mapping
+        For spots and approaches the force across surfaces, where steps tell it as their mean: accelerations, which say
+        it otherwise, may go to and fro from step to step.
     """
 
     t: float
@@ -84,6 +87,7 @@ class Sample:
     unilateral: UnilateralRows = NONE
     dragged: Array = field(default_factory=lambda: np.zeros(0))
     rubbed: Mapping[Any, tuple[Array, bool]] = field(default_factory=dict)
+    pushed: Mapping[Any, float] = field(default_factory=dict)
 
 
 class Sampler:

@@ -53,7 +53,7 @@ from .conserving import check_conserving
 from .coupling import Bodies, Moving, StepEquations, factored
 from .events import Event
 from .gaps import Near, Pose, Rows, Touching
-from .impulses import ImpulseStepper
+from .impulses import TURNED, ImpulseStepper
 from .inertia import Inertia
 from .integrators import InitialState, Integrator, TimeGrid
 from .sampling import Sample
@@ -105,8 +105,8 @@ FRESH = 1e-5
 RINGS = 0.05
 """Turn in a step, rad, beyond which rates at its begin say little of where it leads."""
 
-GROWN = 1e-13
-"""Energy over that of what moves by which it may grow with restitution: rounding."""
+GROWN = 1e-9
+"""Energy over that of what moves by which it may grow with restitution: beyond rounding, also where masses differ."""
 
 HALVED = 30
 """How often the restitution of a cluster is halved at most before it is taken to be zero."""
@@ -206,6 +206,7 @@ class Stepping(Integrator):
             at.t, at.state.q, at.state.y, at.x, at.v, (after.v - before.v) / h, spin, at.state.unwrapped,
             acting=acting, lost=at.lost, unilateral=rows, dragged=after.dragged / h,
             rubbed={key: (impulse / h, sticks) for key, (impulse, sticks) in after.rubbed.items()},
+            pushed={_spot(key): impulse / after.length for key, impulse in after.pushed.items()},
         )  # fmt: skip
 
     def _told(self, before: Moving, after: Moving) -> None:
@@ -239,7 +240,7 @@ class Stepping(Integrator):
             pushed = found.pushed
             _add_rubbed(rubbed, found.rubbed)
             dragged = dragged + found.dragged
-            now, left = found, left - part
+            now, left = replace(found, length=part), left - part
             self.count += 1
         return replace(now, t=t + h, pushed=pushed, rubbed=rubbed, dragged=dragged)
 
@@ -268,7 +269,7 @@ class Stepping(Integrator):
         closely = False
         for _ in range(SEARCHES):
             end = None if end is None else self._pushed(course, end, closely)
-            if end is None or self._farthest(end.x - begin.x) > 2.0 * longest:
+            if end is None or self._farthest(end.x - begin.x) > 2.0 * longest or self._turned(begin, end) > TURNED:
                 return None
             more, missing = self._penetrating(end)
             if not len(more) and not len(missing):
@@ -305,6 +306,14 @@ class Stepping(Integrator):
         names = self.system.model.segments
         own = np.delete(self._displaced(moved), names.without_position, axis=0)
         return float(np.linalg.norm(own, axis=1).max(initial=0.0))
+
+    def _turned(self, begin: Moving, end: _End) -> float:
+        """How far anything turns in a step, rad."""
+        q0, q1 = begin.state.q, end.state.q
+        if self._axes == 2:
+            return float(np.abs(q1 - q0).max(initial=0.0))
+        turned = quaternion.rotation_vector(quaternion.multiply(q1, quaternion.conjugate(q0)))
+        return float(np.abs(turned).max(initial=0.0))
 
     def _penetrating(self, end: _End) -> tuple[Places, Index]:
         """What is inside of each other at the end of a step: pairs of places, and spots that are not yet looked at."""
@@ -627,6 +636,11 @@ def _add_rubbed(found: dict[Any, tuple[Array, bool]], more: Mapping[Any, tuple[A
     for key, (impulse, sticks) in more.items():
         before = found.get(key)
         found[key] = (impulse, sticks) if before is None else (before[0] + impulse, before[1] and sticks)
+
+
+def _spot(key: Spot | Approach | Unilateral) -> Spot | Approach | None:
+    """What touches; None for a string or a stop."""
+    return key.spot if isinstance(key, Unilateral) else key
 
 
 def _owner(key: Spot | Approach | Unilateral) -> object:

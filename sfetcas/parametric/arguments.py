@@ -112,7 +112,10 @@ class Argument:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Least and largest accepted value: the range; else above zero for stiffness, from zero for masses, tension."""
+        """Least and largest accepted value: the range, or what is possible.
+
+        That is above zero for stiffness and radii, from zero for masses and tension, anything for others.
+        """
         if self.low is not None and self.high is not None:
             return self.low, self.high
         entry = (".law." in self.name or ".stretch_law." in self.name) and (
@@ -121,7 +124,7 @@ class Argument:
         signed = entry or any(part in self.name for part in SIGNED)
         of_section = self.name.startswith("sections.") and not signed
         light = of_section and self.name.split(".")[2] in MAY_BE_ZERO
-        if of_section and not light:
+        if (of_section and not light) or self.name.endswith(".radius"):
             return float(np.nextafter(0.0, 1.0)), np.inf
         return (0.0 if light or self.name.endswith(NOT_NEGATIVE) else -np.inf), np.inf
 

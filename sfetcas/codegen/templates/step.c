@@ -6,6 +6,13 @@ static int sf_all_finite(const double *x, int n) {
   return 1;
 }
 
+static int sf_accepted(const double *p) {
+  int i;
+  for (i = 0; i < @NAME@_ARGUMENTS * @NAME@_TIMES; ++i)
+    if (p[i] - p[i] != 0.0 || !(p[i] >= sf_low[i % @sz_one@]) || !(p[i] <= sf_high[i % @sz_one@])) return 0;
+  return 1;
+}
+
 static void sf_copy(double *to, const double *from, int n) {
   int i;
   for (i = 0; i < n; ++i) to[i] = from[i];
@@ -29,8 +36,7 @@ int @name@_step_through(@name@_memory *m, double h, const double *arguments, dou
   int status = @NAME@_DONE, i;
   if (results)
     for (i = 0; i < @NAME@_RESULTS; ++i) results[i] = NAN;
-  if (!(h > 0.0) || h - h != 0.0 || !sf_all_finite(arguments, @NAME@_ARGUMENTS * @NAME@_TIMES) ||
-      !sf_all_finite(state, @NAME@_STATE)) {
+  if (!(h > 0.0) || h - h != 0.0 || !sf_accepted(arguments) || !sf_all_finite(state, @NAME@_STATE)) {
     status = @NAME@_BAD_ARGUMENT;
     m->iterations = 0.0;
     m->gap = NAN;
