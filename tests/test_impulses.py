@@ -11,6 +11,7 @@ from scenes import made
 from test_codegen import built, needs_compiler, said
 from test_contact_motion import FLOOR, G, ball, rod
 from test_slack_motion import bob, string
+from test_stepping import on_a_light_body
 
 from sfetcas import SceneError, export, solve
 from sfetcas.codegen.timestep import time_step
@@ -136,6 +137,12 @@ def test_what_strings_take_is_dissipated():
     assert (event.name, event.side, event.acts) == ("tendons.t", "taut", True)
     assert 0.0 <= event.time - np.sqrt(2 * 0.8 / G) <= 0.01 + 1e-9
     assert motion.last.tendon("t")["slack"] is False
+
+
+@pytest.mark.parametrize("step", [0.007, 0.008])
+def test_all_of_the_speed_is_kept_beside_light_bodies(step):
+    found = followed(stepped(on_a_light_body(0.01), step, 0.28))
+    assert found["nodes.P.velocity"][1] - found["nodes.B.velocity"][1] == pytest.approx(-3.0, rel=1e-6)
 
 
 def test_strings_beside_friction_are_refused():
