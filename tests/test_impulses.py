@@ -59,13 +59,21 @@ def on_hinge(restitution):
     return table
 
 
+def slanting():
+    """A soft rod that falls on a slanting floor in space."""
+    table = rod(0.3, 0.1, {}, kind="flexible", restitution=0.7)
+    table["sections"]["s"]["rhoI"] = [1e-3, 5e-4, 5e-4]
+    table["contacts"]["floor"]["normal"] = [0, 1, 0.3]
+    return {**table, "dimension": "space"}
+
+
 SCENES = {
     "a ball rebounds": (ball({**FLOOR, "restitution": 0.5}, [0, 1], {}), 0.01, 0.7),
     "thrown": (ball({**FLOOR, "restitution": 0.5}, [0, 0.3], {}, velocity=[1.0, -2.0]), 0.01, 0.4),
     "a rod falls flat": (rod(0.0, 0.2, {}), 0.005, 0.3),
     "a rod rebounds end by end": (rod(0.6, 0.45, {}, restitution=0.7), 0.005, 1.0),
     "a soft rod": (rod(0.3, 0.2, {}, kind="flexible"), 0.002, 0.3),
-    "in space": ({**rod(0.3, 0.1, {}, kind="flexible", restitution=0.7), "dimension": "space"}, 0.002, 0.2),
+    "in space": (slanting(), 0.002, 0.2),
     "energy that would grow": (rod(0.6, 0.2, {}, restitution=1.0), 0.01, 0.8),
     "in a bowl": (ball(BOWL, [-0.8, -0.6], {}, out=(0.8, 0.6)), 0.01, 0.5),
     "wedged": (wedged(), 0.004, 0.5),
@@ -270,6 +278,26 @@ def test_what_is_not_exported(more, sentence, tmp_path):
         table["members"]["other"] = {"nodes": ["D", "E"], "type": "rigid"}
     with pytest.raises(SceneError, match=re.escape(sentence)):
         export(stepped(table, 0.01, 0.1, integrator=integrator), tmp_path / "c")
+
+
+@pytest.mark.parametrize("change", ["none", "clamped", "bent", "joined", "hinged"])
+def test_what_nothing_keeps_from_spinning_about_itself_is_refused(change):
+    table = rod(0.3, 0.2, {}, kind="flexible")
+    table = {**table, "dimension": "space"}
+    if change == "clamped":
+        table["nodes"]["A"]["support"] = "clamped"
+    if change == "bent":
+        table["members"]["m"]["shape"] = {"type": "arc", "angle": 0.5}
+    if change in ("joined", "hinged"):
+        table["nodes"]["C"] = {"position": [0, 1.0]}
+        table["members"]["n"] = {**table["members"]["m"], "nodes": ["A", "C"]}
+        table["nodes"]["A"] |= {} if change == "joined" else {"joint": "ball"}
+    scene = stepped(table, 0.01, 0.1)
+    if change in ("none", "hinged"):
+        with pytest.raises(SceneError, match=r"members\.m\.section: found one without inertia about its axis, about"):
+            time_step(scene, "motion")
+    else:
+        assert time_step(scene, "motion").method.name == "stepping"
 
 
 def test_a_step_in_which_something_turns_too_far_is_not_taken():

@@ -10,7 +10,7 @@ from scenes import made
 from scipy.sparse import csc_matrix
 from test_contact_motion import FLOOR, G, balance, ball, rod
 
-from sfetcas import SceneError, solve
+from sfetcas import SceneError, SolveError, solve
 from sfetcas.contact.closest import Closest
 from sfetcas.contact.nearby import Nearby
 from sfetcas.dynamics.beginning import at_rest
@@ -142,6 +142,15 @@ def test_energy_does_not_grow_where_a_step_turns_far():
     energies = stepped(table, 0.002).energies()
     # It grew to 162 J.
     assert np.diff(energies).max() < 1e-9
+
+
+def test_what_has_no_inertia_about_itself_is_named():
+    """A thin rod in space on a slanting floor, of which nothing says how fast it spins."""
+    table = {**rod(0.0, 0.2, {"end": 0.4}), "dimension": "space"}
+    table["sections"]["s"].pop("rhoI")
+    table["contacts"]["floor"]["normal"] = [0, 1, 0.3]
+    with pytest.raises(SolveError, match=r"members\.m has no inertia about its axis, see rhoI"):
+        stepped(table, 0.005)
 
 
 def on_a_light_body(mass):

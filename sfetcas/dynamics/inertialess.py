@@ -5,11 +5,14 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from ..description.scene import Scene
+from ..description.sections import HEAVY
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
+from ..mechanics.rotations import end_joints
 
-__all__ = ["check_balanced", "check_inertia", "check_resisted"]
+__all__ = ["check_balanced", "check_inertia", "check_resisted", "spinning"]
 
 SHIFT = 1e-13
 """Shift of an equilibrated matrix: what its entries have of rounding, or less."""
@@ -170,3 +173,37 @@ def _where(equations: Equations, unknowns: Array) -> list[str]:
     }
     places = [model.segments.places[i] for i in moving]
     return list(dict.fromkeys([*members, *(owners.get(name, name) for name in places)]))
+
+
+def spinning(scene: Scene) -> list[str]:
+    """Straight members that impacts would spin about themselves without inertia, in space.
+
+    What resists is a clamp, or a body at a node, to which they are rigidly joined, and members in other directions.
+    """
+    held = {name for name, node in scene.nodes.items() if node.support == "clamped" or any(node.inertia or ())}
+    stiff = {
+        name: [node for node, joint in end_joints(scene, member) if joint == "rigid"]
+        for name, member in scene.members.items()
+    }
+    along = {name: scene.center_lines[name].tangents(np.array([0.5]))[0] for name in stiff}
+    for name, ends in stiff.items():
+        if scene.center_lines[name].turning > LEVEL:
+            held |= set(ends)
+        others = (other for other in stiff if set(ends) & set(stiff[other]))
+        if any(np.linalg.norm(np.cross(along[name], along[other])) > LEVEL for other in others):
+            held |= set(ends)
+    fixed = set[str]()
+    while more := {name for name, ends in stiff.items() if name not in fixed and held & set(ends)}:
+        fixed |= more
+        held |= {node for name in more for node in stiff[name]}
+    light = list[str]()
+    for name, member in scene.members.items():
+        section = scene.sections.get(str(member.section))
+        bent = scene.center_lines[name].turning > LEVEL
+        if not (name in fixed or bent or section is None or (section.inertia(HEAVY)[:, 0] > 0.0).all()):
+            light.append(name)
+    return light
+
+
+LEVEL = 1e-6
+"""Angle between members, rad, that is none."""

@@ -55,6 +55,7 @@ from .events import Event
 from .gaps import Near, Pose, Rows, Touching
 from .impulses import TURNED, ImpulseStepper
 from .inertia import Inertia
+from .inertialess import spinning
 from .integrators import InitialState, Integrator, TimeGrid
 from .sampling import Sample
 from .stages import StageEquations
@@ -234,7 +235,10 @@ class Stepping(Integrator):
             if found is None:
                 if part < h * 0.5**SHORTER:
                     detail = f"at {now.t * self.system.masses.time:.9g} s no impulses of a step could be found"
-                    raise SolveError(Status.STOPPED, f"{detail} of {part * self.system.masses.time:.3g} s")
+                    detail += f" of {part * self.system.masses.time:.3g} s"
+                    light = spinning(self.system.model.scene)[:1] if self._axes == 3 else []
+                    detail += "".join(f"; members.{name} has no inertia about its axis, see rhoI" for name in light)
+                    raise SolveError(Status.STOPPED, detail)
                 part *= 0.5
                 continue
             pushed = found.pushed
