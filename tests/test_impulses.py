@@ -16,6 +16,7 @@ from test_stepping import on_a_light_body
 from sfetcas import SceneError, export, solve
 from sfetcas.codegen.timestep import time_step
 from sfetcas.dynamics.impulses import PushingRows
+from sfetcas.dynamics.stepping import by_rows
 from sfetcas.mathematics.complementarity import by_pivots
 
 BOWL = {"type": "circle", "center": [0, 0], "radius": 1.0, "side": "inside", "members": "all"}
@@ -83,14 +84,25 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", list(SCENES))
-def test_steps_are_those_of_the_simulation(name):
+def test_steps_are_those_of_the_search(name, monkeypatch):
     """The scheme is the same; what pushes is found by linear complementarity there, by changing sides here."""
     table, step, end = SCENES[name]
     scene = stepped(table, step, end)
-    found, last = followed(scene), solve(scene).last
-    # Both end Newton's method at 1e-9 in each of some hundred steps, whose errors impacts make larger.
+    found, rows = followed(scene), solve(scene)
+    monkeypatch.setattr("sfetcas.dynamics.simulation.by_rows", lambda scene: False)
+    searched = solve(scene)
+    # Both end Newton's method at 1e-8 in each of some hundred steps, whose errors impacts make larger.
     for node in scene.nodes:
-        np.testing.assert_allclose(found[f"nodes.{node}.position"], last.position(node), atol=1e-7)
+        for there in (found[f"nodes.{node}.position"], rows.last.position(node)):
+            np.testing.assert_allclose(there, searched.last.position(node), atol=1e-7)
+    if not by_rows(scene):
+        return
+    told, known = ([(one.name, one.where, one.acts) for one in motion.events] for motion in (rows, searched))
+    assert told == known
+    lost = [motion.last.energy["dissipated"] for motion in (rows, searched)]
+    assert lost[0] == pytest.approx(lost[1], abs=1e-6)
+    forces = [next(iter(motion.last.contacts.values()))["force"] for motion in (rows, searched)]
+    np.testing.assert_allclose(forces[0], forces[1], atol=1e-5)
 
 
 STOPPED = {

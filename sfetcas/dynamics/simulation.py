@@ -46,7 +46,7 @@ from .motion import MotionState, Mover, StopEvent, Trajectory
 from .sampling import StepRecord
 from .shaping import shaped, stretched
 from .stages import StageEquations
-from .stepping import Stepping
+from .stepping import Stepping, by_rows
 from .watching import Watch, finer
 
 __all__ = ["INTEGRATORS", "Simulation", "left", "simulate"]
@@ -177,8 +177,7 @@ class Simulation:
     def run(self, mesh: Mesh, rounds: int, before: int | None = None) -> MeshRun:
         """The motion on a mesh, after so many coarser runs, the last of which took so many steps."""
         begin = time.perf_counter()
-        # Steps with impulses know of contact without rows, but beside strings and stops.
-        stepping = self.name == "stepping" and not self.scene.stopped
+        stepping = self.name == "stepping" and not by_rows(self.scene)
         if self.scene.contacts:
             mesh = replace(mesh, spots=() if stepping else spots_of(self.scene, mesh))
         model = assemble(self.scene, mesh, assembly="nodal")

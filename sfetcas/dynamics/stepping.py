@@ -40,6 +40,7 @@ import numpy as np
 from .. import tolerances
 from ..contact.nearby import Places
 from ..contact.pairs import penetrating
+from ..description.scene import Scene
 from ..errors import SceneError, SolveError, Status
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index, Sparse
@@ -61,7 +62,7 @@ from .sampling import Sample
 from .stages import StageEquations
 from .steps import LAST_CHANGE
 
-__all__ = ["Stepping"]
+__all__ = ["Stepping", "by_rows"]
 
 PENETRATION = 5e-7
 """How far members may penetrate at the end of a step, over their radius."""
@@ -113,6 +114,17 @@ HALVED = 30
 """How often the restitution of a cluster is halved at most before it is taken to be zero."""
 
 
+def by_rows(scene: Scene) -> bool:
+    """Whether what stops members are rows of the model: strings and stops are, and obstacles where that is faster.
+
+    Contact between members is found by a search, and friction with what it finds.  On what is round or moves, the work
+    of rows is that of a step only to second order.
+    """
+    flat = all(stop.kind == "flat" and stop.carrier is None for stop in scene.obstacles.values())
+    apart = scene.rubs or any(contact.between_members for contact in scene.contacts.values())
+    return scene.stopped or (flat and not apart and scene.resolved_dimension == "plane")
+
+
 @dataclass(frozen=True, eq=False)
 class _Course:
     """A step: the state and the pose at its begin, its length, factors (2, groups) in its middle and at its end."""
@@ -153,7 +165,6 @@ class Stepping(Integrator):
     def __init__(self, system: StageEquations, progress: Callable[[float], Any] | None = None) -> None:
         super().__init__(system, progress)
         check_conserving(system, "stepping")
-        # Beside strings and stops obstacles are rows as these are.
         self._rows = ImpulseStepper(system) if len(system.unilateral) else None
         self._equations, self._touching = StepEquations(system), Touching(system)
         self._inertia = Inertia(system)
