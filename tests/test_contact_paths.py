@@ -275,3 +275,28 @@ def test_prescribed_elements_are_used():
     assert path.model.mesh.elements == 4
     # Where it begins to touch the path begins twice: before and after.
     assert len(path.points) == 13
+
+
+def test_an_end_that_lies_without_a_force_is_followed_to_the_end():
+    """A cantilever 1 mm above a floor, pushed down in its middle: it lies from ``1/2 + 6 d / (F / 4)`` on.
+
+    There it has neither slope nor moment, and the floor pushes with ``F / (4 b^2)``; beyond it is straight.
+    """
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0}},
+            "nodes": {"A": {"position": [0, 0.001], "support": "clamped"}, "B": {"position": [1, 0.001]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+            "loads": {"f": {"type": "force", "member": "m", "at": 0.5, "value": [0, -1]}},
+            "contacts": {"c": {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}},
+            "analysis": {"type": "path", "range": [0, 1.5], "accuracy": 1e-7, "steps": [0.5, 1.0, 1.5]},
+        }
+    )
+    path = solve(scene)
+    assert path.status is Status.SOLVED
+    # Small deflections of 1 mm: to the square of the slope.
+    assert [one.factor for one in path.transitions] == pytest.approx([0.0096, 0.048], rel=1e-5)
+    for step in path.steps:
+        begins = 0.5 + 0.024 / step.factor
+        assert step.contacts["c"]["at"] == pytest.approx([begins, 1.0], abs=1e-6)
+        assert step.contacts["c"]["force"][1] == pytest.approx(step.factor / (4.0 * begins**2), rel=1e-5)

@@ -229,12 +229,17 @@ class Lying:
         self, now: Standing, length: float, begins: Sequence[ContactPoint]
     ) -> tuple[Standing | None, float | None]:
         """The point at a length ahead, None if it is not on the same curve, and the factor if it is one to end at."""
-        there = self.ahead(now, length, begins) if begins else None
+        there: Standing | None = None
+        if begins and self._rests(now):
+            # What lies there without a force goes on doing so where nothing else begins to press.
+            there = self.ahead(now, length)
+            there = there if there is not None and self._rests(there) else None
+        there = there or (self.ahead(now, length, begins) if begins else None)
         there = there or self.ahead(now, length)
         if there is None or self._angle(now, there) > SHARPEST * TURNING:
             return None, None
         end = self._end(now, there)
-        return (there, None) if end is None else (self.at_factor(now, end), end)
+        return (there, None) if end is None else (self.at_factor(now, end) or self.at_factor(there, end), end)
 
     def _end(self, now: Standing, there: Standing) -> float | None:
         """The end of the range, or the knot of a history, that is between two points; None where there is none."""
