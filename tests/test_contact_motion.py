@@ -548,6 +548,42 @@ def test_what_needs_smooth_equations_is_refused(tmp_path):
             refused()
 
 
+@pytest.mark.parametrize("integrator", ["radau-3", "stepping"])
+@pytest.mark.parametrize("side", ["outside", "inside", "edge", "plane"])
+def test_members_of_some_radius_are_stopped_by_their_surfaces(side, integrator):
+    """As centre lines are by a larger circle outside, a smaller one inside, a circle round an edge, a higher plane."""
+    start = np.array([-0.8, -0.6]) if side == "inside" else np.array([0.6, 0.8])
+    thick = {
+        "outside": {"type": "circle", "center": [0, 0], "radius": 0.9},
+        "inside": {"type": "circle", "center": [0, 0], "radius": 1.1, "side": "inside"},
+        "edge": {"type": "point", "position": [0.6, -0.3], "side": [0, 1]},
+        "plane": {"type": "plane", "point": [0, 0.3], "normal": [0, 1]},
+    }[side]
+    thin = {
+        "outside": thick | {"radius": 1.0},
+        "inside": thick | {"radius": 1.0},
+        "edge": {"type": "circle", "center": [0.6, -0.3], "radius": 0.1},
+        "plane": thick | {"point": [0, 0.4]},
+    }[side]
+    ends = []
+    for stop in (thick | {"member_radius": 0.1}, thin):
+        analysis = {"end": 0.5, "output": 0.5, "step": 0.01, "integrator": integrator}
+        out = -start if side == "inside" else start
+        motion = solve(made(ball({**stop, "members": "all"}, start, analysis, out=out)))
+        assert motion.events or side in ("outside", "inside")
+        assert motion.last.contacts["stop"]["gap"] > -1e-9
+        ends.append(motion.last.position("B"))
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-12)
+
+
+def test_members_of_some_radius_have_no_friction_in_motion():
+    table = ball({**FLOOR, "member_radius": 0.1, "friction": 0.3}, [0, 1], {"end": 0.1})
+    with pytest.raises(
+        SceneError, match=r"contacts\.stop\.member_radius: found a radius of members with friction in a"
+    ):
+        made(table)
+
+
 def beam_on_pegs(**analysis):
     """A beam that falls level on two pegs, at a fifth of its length from both ends, and bounces."""
     peg = {"type": "circle", "radius": 0.05, "members": "all", "restitution": 0.5}

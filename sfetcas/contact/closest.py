@@ -114,7 +114,7 @@ class Closest:
         width = max(radius, NARROW * scene.center_lines[member].length)
         line = scene.center_lines[member]
         edge = edge_side(stop, line.positions, line.tangents) if stop.kind == "sharp" else 0.0
-        return Pair(name, (member,), radius + stop.sign * stop.radius, width, stop, (first, last), edge)
+        return Pair(name, (member,), stop.distance, width, stop, (first, last), edge)
 
     def draw_back(self, by: float) -> None:
         """Draw back the surfaces of all obstacles and members from where they are by a length, m."""

@@ -84,7 +84,10 @@ def check_contact(
             _check_between(analysis, name, contacts)
         elif obstacle(contact, space).kind == "sharp":
             message = f"found a {contact.type} that members slide over, accepted in a motion: a plane, circle, cylinder"
-            raise SceneError(f"{message} or sphere", (*where, "type"))
+            raise SceneError(f"{message} or sphere, or with 'member_radius'", (*where, "type"))
+        elif contact.friction > 0.0 and contact.member_radius > 0.0:
+            message = "found a radius of members with friction in a motion, whose arm it does not know"
+            raise SceneError(f"{message}, accepted: without one of both", (*where, "member_radius"))
         if analysis.integrator in ("idas", "conserving"):
             found = f"found with the integrator {analysis.integrator!r}, which does not find when it is touched"
             more = "" if contact.between_members else ", generalised-alpha"

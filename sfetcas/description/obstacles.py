@@ -56,6 +56,8 @@ class Obstacle:
         For an edge: direction towards the permitted side.
     carrier : str or None
         Node with which it moves and turns; all else is said of the undeformed scene then.
+    member_radius : float
+        Distance of the centre lines of members from their surfaces, m.
     """
 
     kind: Literal["flat", "round", "sharp"]
@@ -66,6 +68,12 @@ class Obstacle:
     sign: float = 1.0
     side: Array | None = None
     carrier: str | None = None
+    member_radius: float = 0.0
+
+    @property
+    def distance(self) -> float:
+        """Distance of centre lines that touch it from its middle, or from a plane, times the sign, m."""
+        return self.member_radius + self.sign * self.radius
 
     def gaps(self, points: Array, tangents: Array, way: float = 1.0) -> Array:
         """Distances (n,), m, of points (n, 3) of a member, negative inside; of an edge along the member's normal."""
@@ -103,19 +111,21 @@ def obstacle(contact: Contact, space: bool) -> Obstacle:
         side = None if contact.side is None else np.asarray(contact.side, dtype=float)
         normal = unit(contact.normal) if contact.type == "plane" else np.cross([0, 0, 1.0], unit(contact.direction))
         normal = -normal if side is not None and side @ normal < 0.0 else normal
-        return Obstacle("flat", numbers(contact.point), np.outer(normal, normal), normal, carrier=contact.node)
+        flat = Obstacle("flat", numbers(contact.point), np.outer(normal, normal), normal, carrier=contact.node)
+        return replace(flat, member_radius=contact.member_radius)
     if contact.type in ("point", "line"):
         point = contact.position if contact.type == "point" else contact.point
         edge = eye[2] if contact.type == "point" else unit(contact.direction)
         side = np.asarray(contact.side, dtype=float)
         kind: Literal["round", "sharp"] = "round" if contact.member_radius > 0.0 else "sharp"
-        return Obstacle(kind, numbers(point), eye - np.outer(edge, edge), edge, side=side)
+        sharp = Obstacle(kind, numbers(point), eye - np.outer(edge, edge), edge, side=side)
+        return replace(sharp, member_radius=contact.member_radius)
     axis = unit(contact.axis)
     across = eye if contact.type == "sphere" else eye - np.outer(axis, axis)
     sign = -1.0 if contact.side == "inside" else 1.0
-    return Obstacle(
-        "round", numbers(contact.center), across, np.zeros(3), contact.radius or 0.0, sign, carrier=contact.node
-    )
+    radius = contact.radius or 0.0
+    stop = Obstacle("round", numbers(contact.center), across, np.zeros(3), radius, sign, carrier=contact.node)
+    return replace(stop, member_radius=contact.member_radius)
 
 
 def carriers(contacts: Mapping[str, Contact]) -> frozenset[str]:

@@ -1063,7 +1063,7 @@ def _why_points(scene: Scene, name: str) -> str:
     contact = scene.contacts[name]
     if contact.between_members and scene.analysis.type != "dynamic":
         return "contact between members"
-    if contact.member_radius > 0.0:
+    if contact.member_radius > 0.0 and scene.analysis.type != "dynamic":
         return "a radius of members on an obstacle"
     if contact.friction > 0.0 and scene.analysis.type != "dynamic":
         return "friction"

@@ -179,7 +179,7 @@ class Touching:
             out = self._out(group, seen)
             flat = group.stop.kind == "flat"
             apart = out @ group.stop.normal[: self.axes] if flat else np.linalg.norm(out, axis=1)
-            found[group.here] = apart if flat else group.stop.sign * (apart - group.stop.radius / self.unit)
+            found[group.here] = group.stop.sign * apart - group.stop.distance / self.unit
         return found
 
     def friction(self, near: Near) -> Friction:

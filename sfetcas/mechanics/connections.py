@@ -266,13 +266,15 @@ class _Stopper:
 
     def _flat(self, stop: Obstacle, start: Array) -> Array:
         """Data of a place on a plane; ``start`` is where it begins, from the obstacle's place, m."""
-        return np.append(stop.normal[: self.element.axes], start @ stop.normal / self.scales.length)
+        gap = start @ stop.normal - stop.distance
+        return np.append(stop.normal[: self.element.axes], gap / self.scales.length)
 
     def _round(self, stop: Obstacle, start: Array) -> Array:
         """Data of a place on something round."""
         axes, unit = self.element.axes, self.scales.length
         across = stop.across[:axes, :axes].T.ravel()
-        return np.concatenate([across, start[:axes] / unit, [stop.radius / unit, stop.sign]])
+        # Of centre lines it is as much larger, or inside smaller, as members are thick.
+        return np.concatenate([across, start[:axes] / unit, [stop.sign * stop.distance / unit, stop.sign]])
 
 
 def body_numbers(body: BodyData, space: bool, scales: Scales) -> tuple[Array, int]:

@@ -336,8 +336,7 @@ def _distance(scene: Scene, point: ContactPoint) -> Any:
     contact = scene.contacts[point.contact]
     if contact.between_members:
         return sum(contact_radius(contact, scene.members[member], scene.sections) or 0.0 for member in point.members)
-    stop = scene.obstacles[point.contact]
-    return contact.member_radius + stop.sign * stop.radius
+    return scene.obstacles[point.contact].distance
 
 
 def contact_points_in(parts: Parts) -> Iterator[One]:

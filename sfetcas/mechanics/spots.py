@@ -74,7 +74,7 @@ def fine_enough(scene: Scene, mesh: Mesh, accuracy: float, fixed: Collection[str
             continue
         line, rigid = scene.center_lines[member], scene.members[member].type == "rigid"
         dip = accuracy * scene.size * (1.0 if rigid else COARSER)
-        curvature = max(1.0 / stop.radius if stop.kind == "round" and stop.sign > 0.0 else 0.0 for stop in stops)
+        curvature = max(1.0 / stop.distance if stop.kind == "round" and stop.sign > 0.0 else 0.0 for stop in stops)
         curvature += line.turning / line.length
         count = line.length * np.sqrt(curvature / (8.0 * dip))
         if not rigid:
