@@ -242,12 +242,14 @@ class System(Expressions):
 
     @functools.cached_property
     def along_step(self) -> ca.Function:
-        """As of :meth:`_along` at factors that do not change."""
+        """(q, y, factors, unwrapped, step, faster) -> quantities and their derivative along a step of the unknowns, at
+        factors that do not change, whatever their rates ``faster``.
+        """
         return self._along(timed=False)
 
     @functools.cached_property
     def along_step_in_time(self) -> ca.Function:
-        """As of :meth:`_along` at factors that change."""
+        """The same at factors that change with rates ``faster``; gaps of all rows and their derivative follow."""
         return self._along(timed=True)
 
     def rates(self, state: State, factors: Array, step: Array) -> tuple[Array, Array]:

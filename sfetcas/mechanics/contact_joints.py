@@ -92,6 +92,7 @@ class OnPlane(Facing):
 
     on_face: ClassVar[bool] = True
     answers: ClassVar[Mapping[str, str]] = PUSHED
+    """The force of the obstacle, with its unit."""
 
     @property
     def rows(self) -> int:
@@ -115,6 +116,7 @@ class OnRound(Facing):
 
     on_face: ClassVar[bool] = True
     answers: ClassVar[Mapping[str, str]] = PUSHED
+    """The force of the obstacle, with its unit."""
 
     @property
     def rows(self) -> int:
