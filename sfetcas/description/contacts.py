@@ -121,7 +121,8 @@ class Contact(Record):
             raise SceneError(f"the key {key!r} is missing: a {self.type} needs {' and '.join(sorted(needed))}")
         for key in sorted(given - needed - possible - {"type", "member", "members", "restitution", "friction"}):
             what = "members touch each other" if self.between_members else f"the obstacle is a {self.type}"
-            raise SceneError(f"not accepted: {what}", (key,))
+            kinds = ", ".join(kind for kind, keys in _KEYS.items() if key in set().union(*keys))
+            raise SceneError(f"not accepted: {what}" + (f", accepted of: {kinds}" if kinds else ""), (key,))
         if (self.member is None) == (self.members is None):
             raise SceneError("accepted: either member or members, one of them")
         if isinstance(self.members, tuple) and len(set(self.members)) != max(1, len(self.members)):
