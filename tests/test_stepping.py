@@ -153,6 +153,25 @@ def test_what_has_no_inertia_about_itself_is_named():
         stepped(table, 0.005)
 
 
+@pytest.mark.parametrize("by_rows", [True, False])
+def test_what_is_heavy_elsewhere_changes_nothing(by_rows, monkeypatch):
+    """A rod of 1 kg that hits a floor, alone and in a scene with a body of a million tons, whose mass what has none was given."""
+    monkeypatch.setattr("sfetcas.dynamics.simulation.by_rows", lambda scene: by_rows)
+    ends = []
+    for mass in (None, 1e9):
+        table = rod(0.3, 0.1, {"end": 0.2}, restitution=0.5)
+        table["contacts"]["floor"]["members"] = ["m"]
+        if mass:
+            table["nodes"] |= {
+                "C": {"position": [0, 50], "mass": mass, "inertia": [mass] * 3},
+                "D": {"position": [1, 50]},
+            }
+            table["members"]["other"] = {"nodes": ["C", "D"], "type": "rigid"}
+        ends.append(stepped(table, 0.01).last.velocity("B"))
+    # What is left of it is rounding of the heavy one.
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-5)
+
+
 def on_a_light_body(mass):
     """A ball that hits a plane on a light body, without gravity; it keeps all of its speed."""
     stop = {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": ["bar"], "node": "P", "restitution": 1.0}

@@ -22,11 +22,11 @@ from .stages import StageEquations
 __all__ = ["MASSLESS", "SOFT", "Bodies", "Moving", "StepEquations", "factored"]
 
 DUAL, REFINED = 1e-10, 2
-"""Diagonal of rows over the largest mass in the matrix of impulses, and rounds that take it out."""
+"""Diagonal of rows over the largest mass of their body in the matrix of impulses, and rounds that take it out."""
 
 MASSLESS, SOFT = 1e-14, 1e-13
-"""Share of the largest mass, or largest entry of a matrix, that everything has at least, and share of its own by which
-anything is heavier: some combinations of unknowns have no mass.
+"""Share of the largest mass of a body, or of the largest entry in its part of a matrix, that everything has at least,
+and share of its own by which anything is heavier: some combinations of unknowns have no mass.
 """
 
 
@@ -213,11 +213,16 @@ class StepEquations:
 
         matrix, momenta = self._massive(now, factors, v)
         unknowns, size = self.system.equations.unknowns, self.system.total
-        largest = float(np.abs(matrix.diagonal()[:unknowns]).max(initial=TINY))
-        own = matrix.diagonal()[:unknowns]
-        soft = np.append(np.maximum(MASSLESS * largest - own, SOFT * own), np.zeros(size - unknowns))
+        mass = np.abs(matrix.diagonal()[:unknowns])
+        # What is light beside another body is not made heavier by what has no mass of its own.
+        largest = np.full(int(self.bodies.max(initial=0)) + 1, TINY)
+        np.maximum.at(largest, self.bodies[:unknowns], mass)
+        soft = np.zeros(size)
+        soft[:unknowns] = np.maximum(MASSLESS * largest[self.bodies[:unknowns]] - mass, SOFT * mass)
+        dual = np.zeros(size)
+        dual[unknowns:] = DUAL / largest[self.bodies[unknowns:]]
         whole = (matrix + diags(soft)).tocsc()
-        own = splu((whole - diags(np.repeat([0.0, DUAL / largest], [unknowns, size - unknowns]))).tocsc())
+        own = splu((whole - diags(dual)).tocsc())
 
         def solve(right: Array) -> Array:
             found = own.solve(right)

@@ -77,8 +77,8 @@ class Impulsive(Method):
         found = Middle(system, begin, h, factors, q, y, lam)
         every = replace(begin, unwrapped=_with_acting(system, begin.unwrapped, ca.MX.ones(acting.shape)))
         matrix, order = system.matrix(found.entries, [2.0 / h**2], every.unwrapped)
-        soft = ca.diag(ca.DM((np.array(order.order) < n).astype(float)))
-        matrix += MASSLESS * ca.norm_inf(soft @ ca.diag(matrix)) * soft
+        free = np.array(order.order) < n
+        matrix += ca.diag(MASSLESS * _largest_of_bodies(matrix, free) * ca.DM(free.astype(float)))
         own = [order.back[n + row] for row in system.unilateral.rows.tolist()]
         given = ca.MX.zeros(system.total)
         given[own] = lam[system.unilateral.rows.tolist()]
@@ -295,11 +295,12 @@ class _Impulses:
     @staticmethod
     def _matrix(mass: ca.MX, rows: ca.MX) -> ca.MX:
         """Masses and rows, with a little of what makes them independent."""
-        largest = ca.fmax(ca.norm_inf(ca.diag(mass)), TINY)
-        own = ca.diag(mass)
-        soft = ca.diag(ca.fmax(MASSLESS * largest - own, SOFT * own))
-        dual = DUAL_REGULARISATION / largest * ca.MX(ca.DM.eye(rows.shape[0]))
-        return ca.vertcat(ca.horzcat(mass + soft, rows.T), ca.horzcat(rows, -dual))
+        unknowns, count = mass.shape[0], rows.shape[0]
+        whole = ca.vertcat(ca.horzcat(mass, rows.T), ca.horzcat(rows, ca.MX(count, count)))
+        largest = _largest_of_bodies(whole, np.arange(unknowns + count) < unknowns)
+        own = ca.densify(ca.diag(mass))
+        soft = ca.fmax(MASSLESS * largest[:unknowns] - own, SOFT * own)
+        return whole + ca.diag(ca.vertcat(soft, -DUAL_REGULARISATION / largest[unknowns:]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -370,10 +371,7 @@ class _Impact:
 
     def _clusters(self) -> Array:
         """Which rows belong to bodies that rows couple, (clusters, rows), 1 or 0."""
-        from scipy.sparse.csgraph import connected_components
-
-        _, body = connected_components(ca.DM(self.masses.sparsity(), 1.0).sparse(), directed=False)
-        own = body[self.one_sided.own]
+        own = _bodies(self.masses.sparsity())[self.one_sided.own]
         return np.asarray(own == np.unique(own)[:, None], dtype=float)
 
 
@@ -427,6 +425,24 @@ class PushingRows:
         arguments = [ca.MX.sym("x", size), acting, number, matrix, right, closed, least]
         results = [x, _changed(acting, wrong, by, number), number + 1.0, _largest(1.0 * wrong)]
         return ca.Function("round", arguments, results)
+
+
+def _largest_of_bodies(matrix: ca.MX, among: Array) -> ca.MX:
+    """Of each row (n,) the largest size of those diagonal entries, ``among`` (n,) of bool, that belong to its body."""
+    body, diagonal = _bodies(matrix.sparsity()), ca.densify(ca.diag(matrix))
+    found = ca.MX.zeros(matrix.shape[0])
+    for number in range(int(body.max(initial=-1)) + 1):
+        own = np.flatnonzero(body == number)
+        masses = own[among[own]].tolist()
+        found[own.tolist()] = ca.fmax(_largest(diagonal[masses]), TINY) if masses else 1.0
+    return found
+
+
+def _bodies(pattern: ca.Sparsity) -> Array:
+    """Number of the body of each row (n,) of a matrix: of what its entries couple."""
+    from scipy.sparse.csgraph import connected_components
+
+    return np.asarray(connected_components(ca.DM(pattern, 1.0).sparse(), directed=False)[1])
 
 
 def _gaps(system: StageEquations, q: ca.MX, y: ca.MX, factors: ca.MX, unwrapped: ca.MX) -> ca.MX:
