@@ -155,7 +155,7 @@ def test_what_has_no_inertia_about_itself_is_named():
 
 @pytest.mark.parametrize("by_rows", [True, False])
 def test_what_is_heavy_elsewhere_changes_nothing(by_rows, monkeypatch):
-    """A rod of 1 kg that hits a floor, alone and in a scene with a body of a million tons, whose mass what has none was given."""
+    """A rod of 1 kg that hits a floor, alone and in a scene with a body of a million tons."""
     monkeypatch.setattr("sfetcas.dynamics.simulation.by_rows", lambda scene: by_rows)
     ends = []
     for mass in (None, 1e9):
