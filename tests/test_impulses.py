@@ -312,6 +312,13 @@ def test_what_nothing_keeps_from_spinning_about_itself_is_refused(change):
         assert time_step(scene, "motion").method.name == "stepping"
 
 
+def test_strings_do_not_spin_what_has_no_inertia_about_itself():
+    table = {**rod(0.3, 0.2, {}, kind="flexible"), "dimension": "space", "contacts": {}}
+    table["tendons"] = {"t": {"way": [{"ground": [0, 1]}, {"node": "A"}], "length": 1.0}}
+    with pytest.raises(SceneError, match=r"members\.m\.section: found one without inertia about its axis, about"):
+        solve(stepped(table, 0.01, 0.1))
+
+
 def test_a_step_in_which_something_turns_too_far_is_not_taken():
     table = rod(0.0, 1.0, {})
     for node, speed in (("A", -60), ("B", 60)):

@@ -15,7 +15,7 @@ from ..description.scene import Scene, check_scene
 from ..description.showing import shown
 from ..dynamics.impulses import Impulsive
 from ..dynamics.inertia import Inertia
-from ..dynamics.inertialess import spinning
+from ..dynamics.inertialess import refuse_spinning
 from ..dynamics.integrating import Memory, Stepper
 from ..dynamics.methods import Method, Radau
 from ..dynamics.motion import Mover
@@ -245,14 +245,8 @@ def _method(simulation: Simulation) -> Method:
     """The integration method that a scene chooses; SceneError for one whose steps are those of a library."""
     scene = simulation.scene
     if simulation.name == Impulsive.name:
-        if scene.resolved_dimension == "space" and (scene.contacts or scene.stopped):
-            for name in spinning(scene)[:1]:
-                message = (
-                    "found one without inertia about its axis, about which impacts would spin the member, accepted:"
-                )
-                raise SceneError(
-                    f"{message} a section with rhoI, or with a shape and rho", ("members", name, "section")
-                )
+        if scene.contacts or scene.stopped:
+            refuse_spinning(scene)
         return Impulsive()
     if scene.contacts or scene.stopped:
         what = "contact" if scene.contacts else "stops, or tendons that may be slack"

@@ -12,7 +12,7 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
 from ..mechanics.rotations import end_joints
 
-__all__ = ["check_balanced", "check_inertia", "check_resisted", "spinning"]
+__all__ = ["check_balanced", "check_inertia", "check_resisted", "refuse_spinning", "spinning"]
 
 SHIFT = 1e-13
 """Shift of an equilibrated matrix: what its entries have of rounding, or less."""
@@ -203,6 +203,19 @@ def spinning(scene: Scene) -> list[str]:
         if not (name in fixed or bent or section is None or (section.inertia(HEAVY)[:, 0] > 0.0).all()):
             light.append(name)
     return light
+
+
+def refuse_spinning(scene: Scene) -> None:
+    """Refuse a scene in space with members that impacts would spin about themselves.
+
+    Raises
+    ------
+    SceneError
+        Names the section of the first.
+    """
+    for name in spinning(scene)[:1] if scene.resolved_dimension == "space" else []:
+        message = "found one without inertia about its axis, about which impacts would spin the member, accepted:"
+        raise SceneError(f"{message} a section with rhoI, or with a shape and rho", ("members", name, "section"))
 
 
 LEVEL = 1e-6

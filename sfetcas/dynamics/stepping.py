@@ -56,7 +56,7 @@ from .events import Event
 from .gaps import Near, Pose, Rows, Touching
 from .impulses import TURNED, ImpulseStepper
 from .inertia import Inertia
-from .inertialess import spinning
+from .inertialess import refuse_spinning, spinning
 from .integrators import InitialState, Integrator, TimeGrid
 from .sampling import Sample
 from .stages import StageEquations
@@ -165,7 +165,10 @@ class Stepping(Integrator):
     def __init__(self, system: StageEquations, progress: Callable[[float], Any] | None = None) -> None:
         super().__init__(system, progress)
         check_conserving(system, "stepping")
-        self._rows = ImpulseStepper(system) if len(system.unilateral) else None
+        self._rows: ImpulseStepper | None = None
+        if len(system.unilateral):
+            refuse_spinning(system.model.scene)
+            self._rows = ImpulseStepper(system)
         self._equations, self._touching = StepEquations(system), Touching(system)
         self._inertia = Inertia(system)
         self._bodies = Bodies(self._equations.bodies)
