@@ -150,7 +150,7 @@ def test_what_has_no_inertia_about_itself_is_named():
     table["sections"]["s"].pop("rhoI")
     table["contacts"]["floor"]["normal"] = [0, 1, 0.3]
     with pytest.raises(SolveError, match=r"members\.m has no inertia about its axis, see rhoI"):
-        stepped(table, 0.005)
+        stepped(table, 0.02)
 
 
 @pytest.mark.parametrize("by_rows", [True, False])
