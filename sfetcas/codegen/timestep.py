@@ -123,7 +123,7 @@ class TimeStep:
         # A fresh start has no step before it.
         ratio = ca.if_else(parts["last"] > 0.0, span / ca.fmax(parts["last"], 1e-300), 0.0)
         shaped = [ca.reshape(parts[name], *step.size_in(i)) for i, name in enumerate(list(parts)[:7])]
-        given = [*shaped, ratio, span, p, parts["near"], *([parts["opening"]] if step.n_in() > 11 else [])]
+        given = [*shaped, ratio, span, p, parts["near"], *([parts["opening"]] if "opening" in step.name_in() else [])]
         found = dict(zip(step.name_out(), step(*given), strict=True))
         q = found["q_next"]
         lam = ca.reshape(found["lam_stages"], n.lam, self.method.stages)[:, -1]
@@ -221,8 +221,9 @@ def time_step(
     known = Arguments(scene, base, asked, outputs, f"{name}_")
     own = StageEquations(Equations(base), masses_of(base), "interpreted", unilateral=rows_of(base))
     system = parametric_stages(known, own.masses, own.unilateral)
-    mover = Mover(own.equations, Inertia(own), own.masses.time, own.factors)
-    begun, _ = simulation.begun(own, mover.free if len(own.unilateral) else None)
+    # Velocities are those that nothing stops.
+    free = Mover(own.equations, Inertia(own), own.masses.time, own.factors).free if len(own.unilateral) else None
+    begun, _ = simulation.begun(own, free)
     rates = np.zeros((method.kept, len(begun.x)))
     rates[0] = begun.v
     state = begun.state

@@ -176,12 +176,10 @@ def check_unilateral(
     apart = [name for name, contact in contacts.items() if contact.friction > 0.0 or contact.between_members]
     if analysis.integrator not in ("idas", "conserving", *(["stepping"] if apart else [])):
         return
-    found, accepted = f"found with the integrator {analysis.integrator!r}, which does not find when", "accepted: "
+    beside, accepted = "", "accepted: radau-3, radau-2, generalised-alpha, stepping"
     if analysis.integrator == "stepping":
-        accepted += "obstacles without friction beside it"
-        found = f"found beside contacts.{apart[0]} {found.removeprefix('found ')}"
-    else:
-        accepted += "radau-3, radau-2, generalised-alpha, stepping"
+        beside, accepted = f"beside contacts.{apart[0]} ", "accepted: obstacles without friction beside it"
+    found = f"found {beside}with the integrator {analysis.integrator!r}, which does not find when"
     for name, spring in springs.items():
         if spring.stop is not None:
             raise SceneError(f"{found} it acts, {accepted}", ("springs", name, "stop"))

@@ -106,26 +106,24 @@ class Obstacle:
 
 def obstacle(contact: Contact, space: bool) -> Obstacle:
     """The obstacle of a contact in numbers; in the plane a line along z is a point, and one within x-y a wall."""
-    eye = np.eye(3)
+    eye, thick = np.eye(3), contact.member_radius
     if contact.type == "plane" or (contact.type == "line" and not space and abs(unit(contact.direction)[2]) < 0.5):
         side = None if contact.side is None else np.asarray(contact.side, dtype=float)
         normal = unit(contact.normal) if contact.type == "plane" else np.cross([0, 0, 1.0], unit(contact.direction))
         normal = -normal if side is not None and side @ normal < 0.0 else normal
-        flat = Obstacle("flat", numbers(contact.point), np.outer(normal, normal), normal, carrier=contact.node)
-        return replace(flat, member_radius=contact.member_radius)
+        at, across = numbers(contact.point), np.outer(normal, normal)
+        return Obstacle("flat", at, across, normal, carrier=contact.node, member_radius=thick)
     if contact.type in ("point", "line"):
         point = contact.position if contact.type == "point" else contact.point
         edge = eye[2] if contact.type == "point" else unit(contact.direction)
         side = np.asarray(contact.side, dtype=float)
-        kind: Literal["round", "sharp"] = "round" if contact.member_radius > 0.0 else "sharp"
-        sharp = Obstacle(kind, numbers(point), eye - np.outer(edge, edge), edge, side=side)
-        return replace(sharp, member_radius=contact.member_radius)
+        kind: Literal["round", "sharp"] = "round" if thick > 0.0 else "sharp"
+        return Obstacle(kind, numbers(point), eye - np.outer(edge, edge), edge, side=side, member_radius=thick)
     axis = unit(contact.axis)
     across = eye if contact.type == "sphere" else eye - np.outer(axis, axis)
     sign = -1.0 if contact.side == "inside" else 1.0
-    radius = contact.radius or 0.0
-    stop = Obstacle("round", numbers(contact.center), across, np.zeros(3), radius, sign, carrier=contact.node)
-    return replace(stop, member_radius=contact.member_radius)
+    at, radius, nothing = numbers(contact.center), contact.radius or 0.0, np.zeros(3)
+    return Obstacle("round", at, across, nothing, radius, sign, carrier=contact.node, member_radius=thick)
 
 
 def carriers(contacts: Mapping[str, Contact]) -> frozenset[str]:

@@ -19,7 +19,7 @@ from ..mechanics.equations import State
 from .conserving import Middle, symbols_of_step
 from .stages import StageEquations
 
-__all__ = ["MASSLESS", "SOFT", "Bodies", "Moving", "StepEquations", "factored"]
+__all__ = ["MASSLESS", "SOFT", "Bodies", "Moving", "StepEquations", "bodies_of", "factored"]
 
 DUAL, REFINED = 1e-10, 2
 """Diagonal of rows over the largest mass of their body in the matrix of impulses, and rounds that take it out."""
@@ -179,11 +179,8 @@ class StepEquations:
     @functools.cached_property
     def bodies(self) -> Index:
         """Number of the body of each unknown, (total,): what contact alone couples is several."""
-        from scipy.sparse.csgraph import connected_components
-
         found = np.zeros(self._size, np.intp)
-        whole = self._whole(np.ones(self._order.pattern.nnz()))
-        found[self.order] = connected_components(whole, directed=False)[1]
+        found[self.order] = bodies_of(self._order.pattern)
         return found
 
     @functools.cached_property
@@ -231,6 +228,13 @@ class StepEquations:
             return np.asarray(found)
 
         return solve, momenta
+
+
+def bodies_of(pattern: ca.Sparsity) -> Index:
+    """Number of the body of each row (n,) of a matrix: what its entries couple is one."""
+    from scipy.sparse.csgraph import connected_components
+
+    return np.asarray(connected_components(ca.DM(pattern, 1.0).sparse(), directed=False)[1])
 
 
 def factored(matrix: Sparse) -> Any:

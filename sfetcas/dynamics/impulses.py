@@ -25,7 +25,7 @@ from ..mathematics.arrays import TINY, Array
 from ..mathematics.kernels import Batch
 from ..mechanics.equations import State
 from .conserving import Conserving, Middle, check_conserving, symbols_of_step
-from .coupling import MASSLESS, SOFT, Moving
+from .coupling import MASSLESS, SOFT, Moving, bodies_of
 from .integrators import InitialState
 from .methods import Begin, Method
 from .stages import DUAL_REGULARISATION, StageEquations, solution
@@ -36,8 +36,11 @@ __all__ = ["TURNED", "ImpulseStepper", "Impulsive"]
 ITERATIONS, ROUNDS, BLOCKS = 20, 60, 8
 """Iterations of Newton's method and rounds in each at most, and after how many rows change sides one by one."""
 
-TURNED = 1.0
-"""Rotation in a step, rad, beyond which it is not taken: far from where it begins there are other solutions."""
+TURNED = 1.0 + 1e-6
+"""Rotation in a step, rad, beyond which it is not taken: far from where it begins there are other solutions.
+
+A little more than one, which motions may prescribe.
+"""
 
 HALVED = 30
 """How often the restitution of what touches each other is halved before it is taken to be zero."""
@@ -84,8 +87,7 @@ class Impulsive(Method):
         given[own] = lam[system.unilateral.rows.tolist()]
         right = ca.mtimes(matrix, given) - found.residual[order.order]
         one_sided = PushingRows(own, system.unilateral.signs)
-        least = ca.MX(INSIDE)
-        x, pushing, failed = one_sided.solved(matrix, right, acting, ca.MX.ones(acting.shape), least)
+        x, pushing, failed = one_sided.solved(matrix, right, acting, ca.MX.ones(acting.shape), INSIDE)
         step = (x - given)[order.back]
         (there,), shift, more, size = system.moved([q], step)
         size = ca.fmax(size, ca.fmax(failed, _largest(pushing - acting)))
@@ -268,7 +270,7 @@ class _Impulses:
             # Factors go on as in the second half of the step.
             faster = 2.0 * (end - factors[:, 0]) / h
             _, drift, _, rates = system.interpreted.along_step_in_time(q, y, end, unwrapped, nothing, faster)
-            drifts = _opened(system, rates)
+            drifts = system.opened(rates)
         rows, mass, momentum = system.momenta(q, y, end, unwrapped, v - drift)
         masses = self._matrix(mass, rows)
         which, signs = system.unilateral.rows.tolist(), ca.DM(system.unilateral.signs)
@@ -332,7 +334,7 @@ class _Impact:
         where gaps of closed rows open by ``- back`` at least; ``acting`` is a guess of those that push.
         """
         own, signs = self.one_sided.own, ca.DM(self.one_sided.signs)
-        given, right = ca.MX.zeros(self.masses.shape[0]), ca.MX.zeros(self.masses.shape[0])
+        given = ca.MX.zeros(self.masses.shape[0])
         given[own] = signs * self.within
         right = ca.mtimes(self.masses, given)
         right[own] = signs * (self.speeds + back)
@@ -371,7 +373,7 @@ class _Impact:
 
     def _clusters(self) -> Array:
         """Which rows belong to bodies that rows couple, (clusters, rows), 1 or 0."""
-        own = _bodies(self.masses.sparsity())[self.one_sided.own]
+        own = bodies_of(self.masses.sparsity())[self.one_sided.own]
         return np.asarray(own == np.unique(own)[:, None], dtype=float)
 
 
@@ -429,7 +431,7 @@ class PushingRows:
 
 def _largest_of_bodies(matrix: ca.MX, among: Array) -> ca.MX:
     """Of each row (n,) the largest size of those diagonal entries, ``among`` (n,) of bool, that belong to its body."""
-    body, diagonal = _bodies(matrix.sparsity()), ca.densify(ca.diag(matrix))
+    body, diagonal = bodies_of(matrix.sparsity()), ca.densify(ca.diag(matrix))
     found = ca.MX.zeros(matrix.shape[0])
     for number in range(int(body.max(initial=-1)) + 1):
         own = np.flatnonzero(body == number)
@@ -438,21 +440,9 @@ def _largest_of_bodies(matrix: ca.MX, among: Array) -> ca.MX:
     return found
 
 
-def _bodies(pattern: ca.Sparsity) -> Array:
-    """Number of the body of each row (n,) of a matrix: of what its entries couple."""
-    from scipy.sparse.csgraph import connected_components
-
-    return np.asarray(connected_components(ca.DM(pattern, 1.0).sparse(), directed=False)[1])
-
-
 def _gaps(system: StageEquations, q: ca.MX, y: ca.MX, factors: ca.MX, unwrapped: ca.MX) -> ca.MX:
     """Gaps (rows,) of the unilateral rows at the end of a step."""
-    return _opened(system, system.gaps(q, y, system.given(factors), unwrapped))
-
-
-def _opened(system: StageEquations, rows: ca.MX) -> ca.MX:
-    """How far unilateral rows (rows,) among all are open."""
-    return -ca.DM(system.unilateral.signs) * rows[system.unilateral.rows.tolist()]
+    return system.opened(system.gaps(q, y, system.given(factors), unwrapped))
 
 
 def _pushes(system: StageEquations, lam: ca.MX) -> ca.MX:

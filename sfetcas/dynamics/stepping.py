@@ -31,6 +31,7 @@ Laursen and Chawla 1997 (conservation in contact).
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, final
@@ -169,12 +170,20 @@ class Stepping(Integrator):
         if len(system.unilateral):
             refuse_spinning(system.model.scene)
             self._rows = ImpulseStepper(system)
-        self._equations, self._touching = StepEquations(system), Touching(system)
+        self._touching = Touching(system)
         self._inertia = Inertia(system)
-        self._bodies = Bodies(self._equations.bodies)
         self._axes, self._places = system.axes, system.places
         self._driven = bool(system.model.scene.motions)
         self._dragging = system.tables.full if self._touching.rubs else 0
+
+    @functools.cached_property
+    def _equations(self) -> StepEquations:
+        # Where all that stops members are rows they are not needed.
+        return StepEquations(self.system)
+
+    @functools.cached_property
+    def _bodies(self) -> Bodies:
+        return Bodies(self._equations.bodies)
 
     # -- the motion -----------------------------------------------------------------------------------
 

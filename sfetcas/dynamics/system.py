@@ -345,12 +345,16 @@ class System(Expressions):
     @functools.cached_property
     def _opening(self) -> ca.Function:
         """(q, y, factors, unwrapped) -> openings of the unilateral constraints."""
-        n, rows = self.layout, self.unilateral
+        n = self.layout
         q, y = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y)
         factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
         given = self.given(factors)
         gaps = self.gaps(self.with_prescribed_rotations(ca.MX(q), given), y, given, unwrapped)
-        return ca.Function("openings", [q, y, factors, unwrapped], [-ca.DM(rows.signs) * gaps[rows.rows.tolist()]])
+        return ca.Function("openings", [q, y, factors, unwrapped], [self.opened(gaps)])
+
+    def opened(self, rows: ca.MX) -> ca.MX:
+        """How far unilateral constraints are open, of values of all rows, or their rates."""
+        return -ca.DM(self.unilateral.signs) * rows[self.unilateral.rows.tolist()]
 
     def paired(self, rows: int, width: int, n: int) -> ca.Function:
         """A function (A, B, w) -> A^T diag(w) B for each of n blocks of ``rows`` rows and ``width`` columns."""
