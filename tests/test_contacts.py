@@ -1,6 +1,7 @@
 """Contact against closed forms, identities, and what is refused."""
 
 import math
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -507,14 +508,76 @@ def test_wrong_contacts_are_refused(contact, message):
     assert message in str(found.value)
 
 
-def test_point_in_space_and_small_member_are_refused():
+def test_point_in_space_is_refused():
     point = {"type": "point", "position": [0.5, 0], "side": [0, 1], "member": "m"}
     with pytest.raises(SceneError, match="found a point, accepted in space: a line"):
         made(above(0.2, contact=point, loads=weight(1.0), dimension="space"))
-    table = above(0.2, loads=tip(1.0))
+
+
+def test_small_member_that_may_touch_something_is_flexible():
+    """It is so as long as there is the contact, and files keep what was written."""
+    table = above(0.05, loads=tip(1.0))
+    flexible = made(table)
     table["members"]["m"]["type"] = "small"
-    with pytest.raises(SceneError, match="found the small member 'm', accepted: flexible and rigid members"):
+    scene = made(table)
+    found, expected = solve(scene).last, solve(flexible).last
+    assert found.position("B") == pytest.approx(expected.position("B"), abs=1e-14)
+    assert found.contacts["floor"]["force"] == pytest.approx(expected.contacts["floor"]["force"], abs=1e-12)
+    assert found.notes == (
+        "taken for flexible here, as what may touch them bends them between their ends: small member m",
+    )
+    assert scene.to_dict()["members"]["m"]["type"] == "small"
+    assert pickle.loads(pickle.dumps(scene)) == scene
+    assert scene.replace({"contacts.floor": None}).members["m"].type == "small"
+    assert scene.replace({"analysis.accuracy": 1e-4}).members["m"].was_small
+
+
+@pytest.mark.parametrize(("radius", "kind"), [(0.01, "flexible"), (None, "small")])
+def test_small_members_of_no_known_surface_are_left_out_of_all(radius, kind):
+    """Of a small one its section may tell the radius."""
+    table = above(0.0, loads=tip(1.0))
+    own = {"EI3": 1.0} if radius is None else {"shape": "circle", "radius": radius, "E": 1e8, "nu": 0.3}
+    table["sections"] |= {"own": own, "round": {"shape": "circle", "radius": 0.01, "E": 1e8, "nu": 0.3}}
+    table["nodes"] |= {"C": {"position": [0, 0.5], "support": "clamped"}, "D": {"position": [1, 0.5]}}
+    table["nodes"] |= {"E": {"position": [1, 1.0]}}
+    table["members"] = {
+        "m": {"nodes": ["A", "B"], "section": "own", "type": "small"},
+        "n": {"nodes": ["C", "D"], "section": "round"},
+        "o": {"nodes": ["D", "E"], "section": "round"},
+    }
+    table["contacts"] = {"each other": {"type": "members", "members": "all"}}
+    assert made(table).members["m"].type == kind
+
+
+def test_condensed_member_touches_by_a_rigid_one_at_its_node():
+    """Of a cantilever given by its matrix: small deflections of a beam, pushed beyond its end.
+
+    With the deflection w and the slope w' of its end under a force F and the push R at a distance a beyond,
+    w = (R - F) L^3/3 + R a L^2/2 and w' = (R - F) L^2/2 + R a L (EI = 1), the floor is at -w - a w'.
+    """
+    bend = np.array([[12.0, 6.0, -12.0, 6.0], [6.0, 4.0, -6.0, 2.0], [-12.0, -6.0, 12.0, -6.0], [6.0, 2.0, -6.0, 4.0]])
+    stiffness = np.zeros((12, 12))
+    for across, turn, sign in ((1, 5, 1.0), (2, 4, -1.0)):
+        sense = np.diag([1.0, sign, 1.0, sign])
+        stiffness[np.ix_([across, turn, 6 + across, 6 + turn], [across, turn, 6 + across, 6 + turn])] = (
+            sense @ bend @ sense
+        )
+    for axis, size in ((0, 1e4), (3, 1.0)):
+        stiffness[np.ix_([axis, 6 + axis], [axis, 6 + axis])] = size * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    force, far, height = 3e-3, 0.05, 5e-4
+    floor = {"type": "plane", "point": [0, -height], "normal": [0, 1], "member": "m"}
+    table = above(0.0, loads=tip(force), contact=floor)
+    table["members"]["m"] = {"nodes": ["A", "B"], "type": "small", "stiffness": stiffness.tolist()}
+    message = r"contacts\.floor: found the small member 'm', whose stiffness tells nothing of its shape between"
+    with pytest.raises(SceneError, match=message):
         made(table)
+    table["nodes"]["C"] = {"position": [1.0 + far, 0.0]}
+    table["members"]["shoe"] = {"nodes": ["B", "C"], "type": "rigid"}
+    table["contacts"]["floor"] = {**floor, "member": "shoe"}
+    step = solve(made(table)).last
+    push = (force * (1.0 / 3.0 + far / 2.0) - height) / (1.0 / 3.0 + far + far**2)
+    # Linear to the square of the slope, 7e-4.
+    assert step.contacts["floor"]["force"] == pytest.approx([0.0, push, 0.0], rel=1e-5, abs=1e-8)
 
 
 def rods(count, height, *, contact=None, types=None):

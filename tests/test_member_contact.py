@@ -222,6 +222,35 @@ def test_wrong_input_is_told_in_one_sentence(contact, sentence):
     assert "\n" not in str(told.value)
 
 
+def bow(radius, angle=1.5, moment=0.0):
+    """A rod of 1 m that is an arc of an angle, rad, clamped at one end, with a moment at the other one."""
+    bent = 1.0 / angle
+    table = {
+        "dimension": "space",
+        "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "B": {"position": [bent * np.sin(angle), bent * (1.0 - np.cos(angle))]},
+        },
+        "members": {"m": {"nodes": ["A", "B"], "section": "s", "shape": {"type": "arc", "angle": angle}}},
+        "loads": {"M": {"type": "moment", "node": "B", "value": [0, 0, moment]}},
+        "contacts": {"itself": {"type": "members", "members": ["m"], "radius": radius}},
+    }
+    return Scene.from_dict(table)
+
+
+def test_members_thicker_than_their_radius_of_curvature_are_refused_or_told():
+    """A rod may be as thick as it is bent; rounding does not decide."""
+    with pytest.raises(
+        SceneError, match=r"contacts\.itself: the member 'm' of the radius 0\.7 m is bent to a radius of 0\.667"
+    ):
+        bow(0.7)
+    assert bow(1.0 / 1.5)
+    assert not solve(bow(0.4, moment=0.9)).last.notes
+    (note,) = solve(bow(0.4, moment=1.1)).last.notes
+    assert note.startswith("the member 'm' of the radius 0.4 m is bent to a radius of 0.385 m at ")
+
+
 def test_members_that_penetrate_in_the_beginning_are_refused():
     with pytest.raises(SceneError, match=r"penetrate by 0\.01 m at .* of their lengths"):
         solve(leaves(contacts={"pair": {"type": "members", "members": "all", "radius": 0.03}}))

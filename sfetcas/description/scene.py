@@ -15,7 +15,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
-from ..mathematics.arrays import values_of
+from ..mathematics.arrays import Array, values_of
 from ..mathematics.quaternion import matrix
 from .actuation import Actuation, Magnet, MagneticField
 from .answers import answer_name, check_answer
@@ -72,6 +72,7 @@ __all__ = [
     "check_held",
     "check_loaded",
     "check_scene",
+    "too_sharp",
 ]
 
 PRESCRIBED = "prescribed"
@@ -953,6 +954,28 @@ def _check_moving(scene: Scene) -> None:
         check_driving(analysis, scene.nodes, scene.members, scene.motions, scene.histories, scene.tendons)
 
 
+def _bend_where_touched(scene: Scene) -> None:
+    """Take small members with a section that may touch something for flexible ones.
+
+    What pushes a member between its ends bends it there, which no condensed stiffness tells.
+    """
+    touched = set[str]()
+    for contact in scene.contacts.values():
+        named = members_of(contact, scene.members)
+        if contact.between_members and contact.members == "all":
+            # Those whose surface nothing tells are left out of all.
+            named = [m for m in named if contact_radius(contact, scene.members[m], scene.sections) is not None]
+        touched |= set(named)
+    members = dict(scene.members)
+    for name, member in members.items():
+        if name in touched and member.type == "small" and member.section is not None:
+            members[name] = member.taken_for("flexible")
+        elif name not in touched and member.was_small:
+            members[name] = member.taken_for("small")
+    # The record is frozen; this is still its validation.
+    scene.__dict__["members"] = MappingProxyType(members)
+
+
 def _check_contacts(scene: Scene) -> None:
     space = scene.resolved_dimension == "space"
     if scene.contacts and scene.analysis.type == "path":
@@ -1003,11 +1026,7 @@ def _check_contacts(scene: Scene) -> None:
                 )
                 raise SceneError(f"{message} at its nodes", ("magnets", magnetised[member], "member"))
             if scene.members[member].type == "small":
-                accepted = "flexible and rigid members, whose shape between their ends is known"
-                raise SceneError(
-                    f"found the {scene.members[member].type} member {member!r}, accepted: {accepted}",
-                    ("contacts", name),
-                )
+                raise SceneError(f"found the small member {member!r}, {SHAPELESS}", ("contacts", name))
             if _shears(scene, scene.members[member]):
                 raise SceneError(
                     f"found the member {member!r}, which shears, accepted: {UNSHEARED}", ("contacts", name)
@@ -1022,6 +1041,11 @@ def _check_contacts(scene: Scene) -> None:
             except SceneError as error:
                 raise SceneError(f"member {member!r} {error}", ("contacts", name)) from None
 
+
+SHAPELESS = (
+    "whose stiffness tells nothing of its shape between its nodes, accepted: members with a section, as a rigid one"
+    " that ends at a node that touches"
+)
 
 FLATTEST = 1e9
 """Radius of something round, and how far its centre is away, over the size, at which gaps are known to 1e-7 of it."""
@@ -1085,8 +1109,7 @@ def _check_between_members(scene: Scene, name: str) -> None:
     for member in names:
         record = scene.members[member]
         if record.type == "small":
-            message = f"found the small member {member!r}, accepted: flexible and rigid members"
-            raise SceneError(f"{message}, whose shape between their ends is known", where)
+            raise SceneError(f"found the small member {member!r}, {SHAPELESS}", where)
         if contact_radius(contact, record, scene.sections) is None:
             message = f"found the member {member!r}, whose section has no radius, accepted: the key 'radius'"
             raise SceneError(f"{message}, or a section with shape = 'circle' or 'tube' of one radius", where)
@@ -1098,6 +1121,36 @@ def _check_between_members(scene: Scene, name: str) -> None:
             raise SceneError(f"{message}, accepted: members without touch each other", where)
         if _shears(scene, record):
             raise SceneError(f"found the member {member!r}, which shears, accepted: {UNSHEARED}", where)
+        if record.type == "flexible" and (sharp := too_sharp(scene, name, member)):
+            raise SceneError(f"{sharp} in the undeformed scene, accepted: a radius below that of its curvature", where)
+
+
+def too_sharp(scene: Scene, contact: str, member: str, bent: Callable[[Array], Array] | None = None) -> str:
+    """Where a member is bent more sharply than its surface in a contact allows, in words; empty where it is not.
+
+    Parameters
+    ----------
+    scene : Scene
+    contact, member : str
+        Names.
+    bent : callable, optional
+        Fractions (n,) of the length to curvatures (n, 3), 1/m; by default those of the undeformed member.
+    """
+    line = scene.center_lines[member]
+    radius = contact_radius(scene.contacts[contact], scene.members[member], scene.sections)
+    x = np.union1d(np.linspace(0.0, 1.0, SEEN_BENDS), np.array(line.breaks))
+    bends = np.linalg.norm(values_of((bent or line.curvatures)(x))[:, 1:], axis=1)
+    worst, radius = int(np.argmax(bends)), float(values_of(radius))
+    if not bends[worst] * radius > SHARPEST:
+        return ""
+    found = f"the member {member!r} of the radius {radius:.3g} m is bent to a radius of {1.0 / bends[worst]:.3g} m"
+    return f"{found} at {x[worst]:.3g} of its length"
+
+
+SHARPEST, SEEN_BENDS = 1.0 + 1e-9, 65
+"""Curvature times radius beyond which the inner side of a member would be turned inside out, but for rounding, and the
+number of places where it is looked at.
+"""
 
 
 def _shears(scene: Scene, member: Member) -> bool:
@@ -1196,6 +1249,7 @@ def check_scene(value: object, call: str, *, steps: bool = True) -> None:
 
 _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_members,
+    _bend_where_touched,
     _check_lengths,
     _check_tendons,
     _check_tubes,

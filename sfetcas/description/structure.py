@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, model_validator
+from pydantic import BeforeValidator, PrivateAttr, model_validator
 
 from ..errors import SceneError
 from .formulas import Formula
@@ -200,7 +200,7 @@ class Member(Record):
         Name of its cross-section.  A rigid member needs one for its mass only.
     type : text
         ``flexible``, ``rigid``, or ``small`` (or ``superelement``): linear elasticity in a frame that moves
-        with the member.
+        with the member.  A small one with a section that may touch something is taken for flexible.
     shape : table
         The unloaded centre line: a table with the key ``type`` (``straight``, ``arc``, ``helix``, ``curvature``
         or ``spline``) and the keys of that shape.
@@ -252,6 +252,23 @@ class Member(Record):
     turned: Turned | None = None
     insertion: Number = 0.0
     insertion_history: str | None = None
+
+    _was_small: bool = PrivateAttr(False)
+
+    @property
+    def was_small(self) -> bool:
+        """Whether it was described as small, and is flexible as it may touch something."""
+        return self._was_small
+
+    def taken_for(self, type_: Literal["flexible", "small"]) -> Member:
+        """A small member as a flexible one, which :attr:`was_small`, and the other way round."""
+        found = self.model_copy(update={"type": type_})
+        found._was_small = type_ == "flexible"
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """Keys and values as files have them: as it was described."""
+        return super().to_dict() | ({"type": "small"} if self.was_small else {})
 
     @property
     def turned_about(self) -> tuple[Quantity, Quantity, Quantity]:

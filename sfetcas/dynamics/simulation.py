@@ -20,7 +20,7 @@ from ..description.sections import HEAVY
 from ..equilibria.meshing import WHERE, Meshing
 from ..equilibria.quantities import Quantity
 from ..equilibria.settings import Settings
-from ..equilibria.solution import Equilibrium, superelement_notes
+from ..equilibria.solution import Equilibrium, superelement_notes, touched_notes
 from ..errors import LIMITS, SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.threads import single_threaded
@@ -493,6 +493,7 @@ class Simulation:
                 *run.notes,
                 *self._unlikely(run),
                 *self._dip_notes(run),
+                *touched_notes(self.given),
                 *self._superelement_notes(run),
                 *self._law_notes(run),
             ),

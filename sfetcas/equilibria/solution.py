@@ -14,7 +14,9 @@ import numpy as np
 
 from ..contact import closest
 from ..description.answers import STATICS, may_lie, outlined
-from ..description.records import brief, counted, nearest, plain
+from ..description.obstacles import members_of
+from ..description.records import brief, counted, enumerated, nearest, plain
+from ..description.scene import Scene, too_sharp
 from ..description.showing import (
     error_in_words,
     first_lines,
@@ -52,6 +54,7 @@ __all__ = [
     "refuse_large",
     "steps_in_words",
     "superelement_notes",
+    "touched_notes",
 ]
 
 MOST_SHOWN = 4
@@ -706,6 +709,8 @@ def refuse_large(fields: Fields) -> None:
 
 def _notes(fields: Fields) -> Iterator[str]:
     """Notes on what the model leaves out, or is beyond its validity."""
+    yield from touched_notes(fields.model.scene)
+    yield from sharp_notes(fields)
     yield from superelement_notes(fields)
     yield from beyond_laws(fields).values()
     yield from strain_notes(fields)
@@ -755,6 +760,30 @@ def tendon_notes(fields: Fields) -> tuple[str, ...]:
 
 LEFT_OUT = 3.0
 """Times the accuracy that stretch and shear may move ends of members, by the estimate, before a note tells it."""
+
+
+def touched_notes(scene: Scene) -> tuple[str, ...]:
+    """A note on small members that are flexible ones as they may touch something."""
+    names = [name for name, member in scene.members.items() if member.was_small]
+    message = "taken for flexible here, as what may touch them bends them between their ends:"
+    return (f"{message} {enumerated(names, 'small member')}",) if names else ()
+
+
+def sharp_notes(fields: Fields) -> Iterator[str]:
+    """Notes on members that are bent more sharply than their surfaces allow, which no contact with others sees."""
+    scene = fields.model.scene
+    for name, contact in scene.contacts.items():
+        if not contact.between_members:
+            continue
+        for member in members_of(contact, scene.members):
+            if scene.members[member].type == "flexible":
+                found = too_sharp(scene, name, member, functools.partial(_bends, fields, member))
+                yield from [f"{found}: its inner side would penetrate itself"] if found else []
+
+
+def _bends(fields: Fields, member: str, x: Array) -> Array:
+    """Curvatures (n, 3), 1/m, at fractions of the length of a member."""
+    return fields.along(member, x)["curvature"]
 
 
 def superelement_notes(fields: Fields) -> tuple[str, ...]:
