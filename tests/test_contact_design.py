@@ -45,6 +45,30 @@ def test_obstacle_for_a_force():
     assert step.contacts["c"]["force"][1] == pytest.approx(1.5, abs=1e-5)
 
 
+@pytest.mark.parametrize("goal", [-0.05, 0.05])
+def test_what_touches_at_the_guess_only_is_let_go(goal):
+    """A tip that the floor stops at the guess cannot be moved while it touches."""
+    low = {"type": "plane", "point": [0, -0.1], "normal": [0, 1]}
+    problem = design(pressed({"floor": low}), {"loads.F.value": (-9, 9)})
+    force = problem.variable("loads.F.value")
+    problem.subject_to(problem.answer("", "nodes.B.position")[1] >= goal)
+    problem.subject_to(force[0] == 0)
+    problem.minimise((force[1] + 0.5 * (goal < 0)) ** 2)
+    answer = problem.solve()
+    step = solve(answer.scene()).last
+    assert step.position("B")[1] == pytest.approx(goal, abs=1e-7)
+    # Small deflections, to their square.
+    assert answer.values["loads.F.value"][1] == pytest.approx(3.0 * goal, rel=5e-3)
+
+
+def test_what_cannot_be_met_with_or_without_touch_is_told():
+    low = {"type": "plane", "point": [0, -0.1], "normal": [0, 1]}
+    problem = design(pressed({"floor": low}), {"loads.F.value": (-9, 9)})
+    problem.subject_to(problem.answer("", "nodes.B.position")[1] == -0.2)
+    with pytest.raises(SolveError, match=r"most is missed at nodes\.B\.position"):
+        problem.solve()
+
+
 def two():
     low = {"type": "circle", "center": [0.8, -0.45], "radius": 0.1}
     return pressed({"c": {**DRUM, "center": [0.4, -0.3], "radius": 0.25}, "d": low})

@@ -144,8 +144,10 @@ class Solving:
 
     # -- the beginning ------------------------------------------------------------------------------
 
-    def _pilots(self, values: Mapping[str, Array]) -> dict[int, Solved]:
+    def _pilots(self, values: Mapping[str, Array], *, apart: bool = False) -> dict[int, Solved]:
         """Equilibria of some cases for values of the unknowns; along lines that of the first one.
+
+        ``apart`` leaves out what touches.
 
         Raises
         ------
@@ -161,6 +163,7 @@ class Solving:
         self._meshes = []
         for i in chosen:
             scene = self._scene(i, values)
+            scene = scene.model_copy(update={"contacts": {}}) if apart else scene
             try:
                 mesh, self._assembly, answer = asked_mesh(scene, settings, lines=True)
             except SceneError as error:
@@ -241,9 +244,21 @@ class Solving:
         """
         refuse_contradictions(self.formulation)
         values: Mapping[str, Array] = self.formulation.guesses
-        tried = []
+        tried, lost = [], None
         while True:
-            optimum, error = self._solved(values)
+            try:
+                optimum, error = self._solved(values, apart=lost is not None and not tried)
+            except SolveError as failed:
+                # What touches at the guess may be what cannot be met: all of it is let go, once.
+                if lost is not None or tried or not (self._meshes and what_touches(self._meshes[0])):
+                    raise lost or failed from None
+                lost = failed
+                continue
+            except SceneError:
+                # What is at rest only as something stops it.
+                if lost is None:
+                    raise
+                raise lost from None
             changed = self._changed(optimum)
             if not changed and error <= self.formulation.accuracy:
                 return optimum
@@ -261,11 +276,11 @@ class Solving:
                 return labelled(self.formulation.cases[i], what)
         return ""
 
-    def _solved(self, values: Mapping[str, Array]) -> tuple[Optimum, float]:
-        """The solution with what touches for values of the unknowns, from these, and its error; where something else
-        touches there the error may be larger than it was asked for.
+    def _solved(self, values: Mapping[str, Array], *, apart: bool = False) -> tuple[Optimum, float]:
+        """The solution with what touches for values of the unknowns, or with all ``apart``, from these, and its error;
+        where something else touches there the error may be larger than it was asked for.
         """
-        pilots = self._pilots(values)
+        pilots = self._pilots(values, apart=apart)
         mesh = _united(self._meshes)
         equations = self._equations(mesh)
         states, places = self._begun(equations, pilots, values)
