@@ -20,18 +20,20 @@ FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "m"}
 
 def test_pressure_along_a_line_is_what_lies_on_it_or_is_wound_round_it():
     """On a floor the weight; on a drum the tension over the radius; with what presses at its ends it is the force."""
-    *_, lying = solve(load("problems/floor_heavy_cantilever.toml")).steps
+    floor = load("problems/floor_heavy_cantilever.toml")
+    lying = solve(floor.replace({"analysis.steps": floor.analysis.steps[-1:]})).last
     (begin, end), at = lying.contacts["floor"]["at"], np.array([0.5, 0.8, 0.86, 0.93, 0.99])
     # The pressure has the accuracy of forces, two derivatives of positions.
     assert lying.along("beam", at)["pressure"][:, 1] == pytest.approx([0, 0, 30, 30, 30], abs=1e-4)
-    jump = lying.along("beam", [begin - 1e-9, begin + 1e-9])["force"]
+    # Where the line begins is known to some 1e-9.
+    jump = lying.along("beam", [begin - 1e-7, begin + 1e-7])["force"]
     whole = lying.contacts["floor"]["force"]
     assert whole == pytest.approx(jump[0] - jump[1] + [0, 30 * (end - begin), 0], abs=1e-4)
     assert value_of(lying, "members.beam.pressure", at=0.93) == pytest.approx([0, 30, 0], abs=1e-4)
 
     drum = load("problems/drum_cantilever_tip_force.toml")
     (member,), (radius, centre) = drum.members, (drum.contacts["drum"].radius, drum.contacts["drum"].center)
-    last = solve(drum).last
+    last = solve(drum.replace({"analysis.steps": [6]})).last
     begin, end = last.contacts["drum"]["at"]
     found = last.along(member, np.linspace(begin, end, 9)[1:-1])
     outwards = found["position"] - np.array([*centre[:2], 0.0])
