@@ -170,6 +170,24 @@ def test_two_rings_beside_each_other():
     assert step.position("B")[1] == pytest.approx(clamped.position("B")[1], rel=0.05)
 
 
+def test_a_ring_that_is_driven_off_its_member_beside_a_floor_is_told_as_without_it():
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0.1], "support": "clamped"},
+            "B": {"position": [1, 0.1]},
+            "R": {"position": [0.3, 0.1]},
+        },
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "rings": {"r": {"node": "R", "member": "m", "travel": 0.3}},
+        "loads": {"F": {"type": "force", "node": "R", "value": [0, -1.0]}},
+        "contacts": {"floor": {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "m"}},
+        "analysis": {"steps": [3]},
+    }
+    with pytest.raises(SolveError, match=r"a member slides out of a ring \(ring 'r' would be at the fraction 1\.0"):
+        solve(Scene.from_dict(table))
+
+
 def test_what_slides_off_is_told():
     """A bead on a beam that bends down, a beam that rests on two rings."""
     bead = {"nodes.R": {"position": [0.6, 0], "mass": 1.0}, "gravity": [0, -1]}

@@ -893,7 +893,13 @@ class MemberContact:
         return tangential == 2
 
     def follow(self, way: Callable[[float], Way], start: Solved) -> Solved | None:
-        """The state at the end of a way, ``way(1)``, from its begin; None if it is lost."""
+        """The state at the end of a way, ``way(1)``, from its begin; None if it is lost.
+
+        Raises
+        ------
+        SolveError
+            The way leads beyond what the scene describes, see :meth:`.Fields.beyond_limits`.
+        """
         self.jumps, self.beside, self.falls, mesh = [], [], 0, replace(start.model.mesh, points=())
         unstable: _Step | None = None
         self.patient = False
@@ -940,6 +946,9 @@ class MemberContact:
                     return None
                 continue
             assert there is not None
+            limit = there.fields.beyond_limits() if self.scene.limited_on_ways else None
+            if limit is not None:
+                raise limit
             if falling:
                 rest = self._fallen_on(mesh, there, way(part))
                 if rest is None:
