@@ -20,7 +20,7 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import State
 from ..mechanics.mesh import Mesh, breaks_of
 from ..mechanics.model import assemble
-from ..parametric.arguments import Argument, Arguments
+from ..parametric.arguments import Argument, Arguments, refuse_idle
 from ..parametric.results import Results
 from ..solvers.globalised import Code, Globalised, Rules
 from ..solvers.prepared import Prepared
@@ -82,7 +82,9 @@ class CaseEquations:
         base = assemble(scene, mesh, assembly=of_all)
         self.scales = base.scales
         self.results = Results(base, results, places)
-        self.arguments = Arguments(scene, base, arguments, self.results, "design_")
+        self.arguments = Arguments(scene, base, arguments, self.results, "design_", needed=False)
+        # Numbers of an obstacle count as soon as it is touched.
+        refuse_idle([name for name in self.arguments.idle if not name.startswith("contacts.")])
         self.program = self.arguments.program
         self.model = self.arguments.model
         self.total = self.program.expressions.total

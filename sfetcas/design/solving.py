@@ -266,8 +266,11 @@ class Solving:
             values = optimum.iterate.values
             self._pilots(values)
             if what_touches(self._meshes[0]) in tried:
-                detail = f"what touches does not settle: {changed or 'statics finds something else'}"
-                raise SolveError(Status.FAILED, f"{detail} in the solution for another touch", optimum.iterate)
+                detail = (
+                    "what touches does not settle, as where a solution is just where something begins to touch: "
+                    f"{changed or 'statics finds something else'}"
+                )
+                raise SolveError(Status.FAILED, f"{detail}, in the solution for another touch", optimum.iterate)
 
     def _changed(self, optimum: Optimum) -> str:
         """What touches otherwise in a solution than it was found for, as a sentence; empty where nothing does."""
