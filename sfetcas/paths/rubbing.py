@@ -249,6 +249,8 @@ class Rubbing(Lying):
 
     def traced(self, start: Standing, flat: Callable[[Standing], list[ContactPoint]], count: int) -> Traced:
         """The path from a point on, for so many points."""
+        # Where it comes from displacements of nodes may not count.
+        start = replace(start, tangent=self.curve(start).normed(start.tangent))
         points, events, corners, base = [start], list[Event](), list[Corner](), start
         longer, length, wall = self.finer * (self.span[1] - self.span[0]) / SHARE, FIRST * self.finer, np.inf
         known = [(start.arc, self._margin(start))]
