@@ -35,7 +35,7 @@ class Status(enum.Enum):
     SHORT = "solved, but not to the accuracy asked for"
     CUT = "solved, but the path could not be followed to the end of its range"
     INFEASIBLE = "no shape of the members satisfies all supports, joints and motions"
-    UNMET = "no values of the unknowns within their bounds meet all that is asked for"
+    UNMET = "no values of the unknowns within their bounds were found that meet all that is asked for"
     STRETCHED = "no finite force holds the members"
     BENT = "a small member bends beyond linear elasticity"
     OUTSIDE = "a magnet leaves the table of its field"

@@ -74,6 +74,29 @@ def test_numbers_of_what_is_let_go_stay_unknown():
     assert values["loads.F.value.1"] == pytest.approx(-0.15, rel=5e-3)  # small deflections
 
 
+def beside_a_peg(force):
+    """A peg below the end of a cantilever, which a force pushes down."""
+    return pressed({"peg": {"type": "circle", "center": [0.9, -0.1], "radius": 0.05}}, load=(0, force))
+
+
+@pytest.mark.parametrize("force", [-0.1, -0.4], ids=["apart", "touching"])
+def test_parameters_do_not_lead_past_an_obstacle(force):
+    """Where it is only the loads growing from zero that the peg stops."""
+    known = parametric(beside_a_peg(force), ["loads.F.value"], ["nodes.B.position"])
+    found = known.solve({"loads.F.value": [0, -4]})["nodes.B.position"]
+    assert found == pytest.approx(solve(beside_a_peg(-4)).last.position("B"), abs=1e-7)
+
+
+@pytest.mark.parametrize("force", [-2.0, 0.05], ids=["touching", "apart"])
+def test_a_design_is_on_the_side_to_which_the_loads_lead(force):
+    """Beyond the peg it would be at -0.6."""
+    problem = design(beside_a_peg(force), {"loads.F.value": (-30, 30)}, accuracy=1e-6)
+    problem.subject_to(problem.variable("loads.F.value")[0] == 0)
+    problem.subject_to(problem.answer("", "nodes.B.position")[1] == -0.6)
+    with pytest.raises(SolveError):
+        problem.solve()
+
+
 def test_what_cannot_be_met_with_or_without_touch_is_told():
     low = {"type": "plane", "point": [0, -0.1], "normal": [0, 1]}
     problem = design(pressed({"floor": low}), {"loads.F.value": (-9, 9)})

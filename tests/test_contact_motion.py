@@ -661,3 +661,40 @@ def test_what_nothing_pulls_moves_alike_at_any_speed(speed):
     np.testing.assert_allclose([e.time * speed for e in other.events], [e.time for e in slow.events], rtol=1e-5)
     np.testing.assert_allclose(other.last.position("A"), slow.last.position("A"), rtol=0, atol=1e-6)
     assert other.last.energy["dissipated"] == pytest.approx(speed**2 * slow.last.energy["dissipated"], rel=1e-5)
+
+
+def over_a_peg(radius, **analysis):
+    """A bar that falls on a thin peg beside its middle."""
+    return Scene.from_dict(
+        {
+            "gravity": [0, -9.81],
+            "sections": {"s": {"rhoA": 1.0}},
+            "nodes": {"A": {"position": [0, 0]}, "B": {"position": [1, 0.05]}},
+            "members": {"bar": {"nodes": ["A", "B"], "section": "s", "type": "rigid"}},
+            "contacts": {"peg": {"type": "circle", "center": [0.2, -0.21], "radius": radius, "member": "bar"}},
+            "analysis": {"type": "dynamic", "end": 0.25, "output": 0.25, "accuracy": 1e-3, **analysis},
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("radius", "analysis", "late"),
+    [
+        (0.01, {}, 5e-4),  # the accuracy over the speed
+        (0.02, {"integrator": "stepping", "step": 0.02}, 0.02),  # the end of a step
+        (0.01, {"integrator": "stepping", "step": 0.05}, 0.05),
+    ],
+    ids=["event by event", "stepping", "in long steps"],
+)
+def test_nothing_falls_through_a_thin_peg_within_a_step(radius, analysis, late):
+    """In a step it moves by far more than the peg is thick."""
+    found = solve(over_a_peg(radius, **analysis))
+    hit = np.sqrt(2.0 * (0.22 - radius * np.hypot(1.0, 0.05)) / 9.81)
+    assert hit - 1e-9 < found.events[0].time < hit + late
+    # It turns about the peg; in free fall it would be at -0.31.
+    assert found.last.position("A")[1] > -0.25
+
+
+def test_what_may_slip_through_between_the_places_that_stop_is_told():
+    (note,) = solve(over_a_peg(1e-3, integrator="stepping", step=0.05, end=0.05, output=0.05)).notes
+    assert note.startswith("contacts.peg stops 'bar' at places that are 0.00391 m apart, more than its diameter")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import SOFT, made
 
-from sfetcas import Scene, SceneError, SolveError, Status, load, solve
+from sfetcas import Scene, SceneError, SolveError, Status, find, load, solve
 from sfetcas.contact.closest import Closest
 from sfetcas.description.obstacles import obstacle
 from sfetcas.description.scene import Contact
@@ -532,6 +532,21 @@ def test_small_member_that_may_touch_something_is_flexible():
     assert pickle.loads(pickle.dumps(scene)) == scene
     assert scene.replace({"contacts.floor": None}).members["m"].type == "small"
     assert scene.replace({"analysis.accuracy": 1e-4}).members["m"].was_small
+    changed = scene.replace({"members.m.b2": [0, 1, 0]})
+    assert changed.members["m"].was_small
+    assert changed.replace({"contacts.floor": None}).members["m"].type == "small"
+    with pytest.raises(SceneError, match=r"members\.m\.elements: a small member is not cut"):
+        scene.replace({"members.m.elements": 4})
+
+
+def test_notes_of_paths_modes_and_designs_name_what_is_taken_for_flexible():
+    table = above(0.05, loads=tip(1.0))
+    table["members"]["m"]["type"] = "small"
+    message = "taken for flexible here, as what may touch them bends them between their ends: small member m"
+    assert message in solve(made(table | {"analysis": {"type": "path", "range": [0, 1]}})).notes
+    assert message in solve(made(table | {"analysis": {"type": "modes", "modes": 1}})).notes
+    found = find(made(table), ["loads.F.value.1"], {"nodes.B.angle": -0.02})
+    assert message in found.notes
 
 
 @pytest.mark.parametrize(("radius", "kind"), [(0.01, "flexible"), (None, "small")])

@@ -7,7 +7,7 @@ import pytest
 from motions import FLAT, THICK, cantilever, changed, moved, tip
 
 import sfetcas
-from sfetcas import SceneError, SolveError
+from sfetcas import Scene, SceneError, SolveError, solve
 
 pytestmark = pytest.mark.usefixtures("interpreted")
 
@@ -44,6 +44,22 @@ def test_velocities_that_joints_allow_nearly():
 def test_followers_have_no_energy_to_keep():
     table = changed(cantilever(), loads__tip__frame="follower")
     refused(table, "loads.tip: found a follower with the integrator 'conserving'", integrator="conserving")
+
+
+def test_what_is_straight_between_clamps_and_keeps_its_length_is_named():
+    held = {"position": [0.2, 0], "support": "clamped"}
+    table = {
+        "gravity": [0, -9.81],
+        "sections": {"s": {"EI3": 1e-3, "rhoA": 0.1}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": held},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "analysis": {"type": "dynamic", "end": 0.1, "step": 0.01},
+    }
+    with pytest.raises(SolveError, match="a member is straight between places that come no closer"):
+        solve(Scene.from_dict(table))
+    # It may stretch, or its end may slide.
+    table["sections"]["s"]["EA"] = 100.0
+    assert solve(Scene.from_dict(table))
 
 
 def test_gauss_integration_is_refused():

@@ -465,7 +465,8 @@ _UNITS = {"gravity": "m/s2", "rotating": "rad/s"}
 
 
 def _remade(record: Record, entries: Mapping[str, Any]) -> Record:
-    return Record.replace(record, **entries)
+    # That of a scene takes keys with dots.
+    return Record.replace(record, **entries) if isinstance(record, Scene) else record.replace(**entries)
 
 
 _NUMERICAL = {"analysis": ("accuracy", "accuracy_of", "step", "integrator"), "members": ("element", "elements")}
@@ -1138,7 +1139,7 @@ def too_sharp(scene: Scene, contact: str, member: str, bent: Callable[[Array], A
     """
     line = scene.center_lines[member]
     radius = contact_radius(scene.contacts[contact], scene.members[member], scene.sections)
-    x = np.union1d(np.linspace(0.0, 1.0, SEEN_BENDS), np.array(line.breaks))
+    x = np.union1d(np.linspace(0.0, 1.0, SEEN_BENDS[bent is not None]), np.array(line.breaks))
     bends = np.linalg.norm(values_of((bent or line.curvatures)(x))[:, 1:], axis=1)
     worst, radius = int(np.argmax(bends)), float(values_of(radius))
     if not bends[worst] * radius > SHARPEST:
@@ -1147,9 +1148,9 @@ def too_sharp(scene: Scene, contact: str, member: str, bent: Callable[[Array], A
     return f"{found} at {x[worst]:.3g} of its length"
 
 
-SHARPEST, SEEN_BENDS = 1.0 + 1e-9, 65
+SHARPEST, SEEN_BENDS = 1.0 + 1e-9, (1025, 129)
 """Curvature times radius beyond which the inner side of a member would be turned inside out, but for rounding, and the
-number of places where it is looked at.
+number of places where it is looked at, undeformed and deformed.
 """
 
 

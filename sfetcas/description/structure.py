@@ -266,6 +266,10 @@ class Member(Record):
         found._was_small = type_ == "flexible"
         return found
 
+    def replace(self, **changes: Any) -> Member:
+        """A copy with other values, validated anew as it was described; None stands for the default."""
+        return super().replace(**({"type": "small"} if self.was_small else {}) | changes)
+
     def to_dict(self) -> dict[str, Any]:
         """Keys and values as files have them: as it was described."""
         return super().to_dict() | ({"type": "small"} if self.was_small else {})

@@ -10,7 +10,7 @@ from ..errors import SceneError
 from .answers import selected
 from .records import Fraction, Number, Numbers, Positive, Record, listed, number, say
 
-__all__ = ["Analysis", "Expect", "Until", "checked_accuracy"]
+__all__ = ["FINEST", "Analysis", "Expect", "Until", "checked_accuracy"]
 
 FINEST = 1e-14
 """Accuracy that can be asked for: rounding leaves 4e-16 to 5e-15 of the size between one mesh and the next."""

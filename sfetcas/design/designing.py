@@ -14,6 +14,7 @@ from ..description.records import counted
 from ..description.records import unknown as not_known
 from ..description.scene import Scene, check_scene
 from ..description.showing import first_lines, notes_in_words, shown, values_in_words
+from ..description.task import FINEST
 from ..equilibria.solution import Equilibrium
 from ..equilibria.statics import solve
 from ..errors import SceneError, SolveError
@@ -128,7 +129,8 @@ class DesignAnswer:
         Where there are several equilibria under the same loads, that may be another one.
         """
         here = self.cases[case]
-        there = solve(self.scene(case), accuracy=here.certificate.error_estimate or None).last
+        error = here.certificate.error_estimate
+        there = solve(self.scene(case), accuracy=max(error, FINEST) if error else None).last
         apart = [np.linalg.norm(here.position(n) - there.position(n)) for n in self.scene(case).nodes]
         return float(max(apart)) / self.scene(case).size
 

@@ -14,6 +14,7 @@ from ..contact.kept import Kept
 from ..description.records import counted
 from ..equilibria.settings import Settings
 from ..equilibria.single import solved_from
+from ..equilibria.solution import touched_notes
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.kernels import Kernels
@@ -56,6 +57,9 @@ WARM = {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6, "warm_start_ini
 
 PILOTS = 5
 """Cases that are solved from the undeformed state, spread over all; the others follow from their neighbours."""
+
+ELSEWHERE = 1e-2
+"""Distance of nodes, over the size, from which on an equilibrium is another one."""
 
 VIOLATED = 1e-6
 """Rows that miss by less, in their units, are not named."""
@@ -156,9 +160,7 @@ class Solving:
         SolveError
             In one case something else touches than in another.
         """
-        count = len(self.formulation.cases)
-        chosen = sorted({round(x) for x in np.linspace(0, count - 1, min(PILOTS, count))})
-        settings = Settings(accuracy=self.formulation.accuracy)
+        settings, chosen = Settings(accuracy=self.formulation.accuracy), self._chosen
         found: dict[int, Solved] = {}
         self._meshes = []
         for i in chosen:
@@ -244,27 +246,28 @@ class Solving:
         """
         refuse_contradictions(self.formulation)
         values: Mapping[str, Array] = self.formulation.guesses
-        tried, lost = [], None
+        pilots, tried, lost = self._pilots(values), list[Any](), None
         while True:
             try:
-                optimum, error = self._solved(values, apart=lost is not None and not tried)
+                optimum, error = self._solved(values, pilots)
             except SolveError as failed:
                 # What touches at the guess may be what cannot be met: all of it is let go, once.
-                if lost is not None or tried or not (self._meshes and what_touches(self._meshes[0])):
+                if lost is not None or tried or not what_touches(self._meshes[0]):
                     raise lost or failed from None
                 lost = failed
+                try:
+                    pilots = self._pilots(values, apart=True)
+                except SceneError:
+                    # It rests only as something stops it.
+                    raise lost from None
                 continue
-            except SceneError:
-                # What is at rest only as something stops it.
-                if lost is None:
-                    raise
-                raise lost from None
-            changed = self._changed(optimum)
+            changed, values = self._changed(optimum), optimum.iterate.values
             if not changed and error <= self.formulation.accuracy:
-                return optimum
+                changed = self._elsewhere(optimum)
+                if not changed:
+                    return optimum
             tried.append(what_touches(optimum.mesh))
-            values = optimum.iterate.values
-            self._pilots(values)
+            pilots = self._pilots(values)
             if what_touches(self._meshes[0]) in tried:
                 detail = (
                     "what touches does not settle, as where a solution is just where something begins to touch: "
@@ -279,11 +282,33 @@ class Solving:
                 return labelled(self.formulation.cases[i], what)
         return ""
 
-    def _solved(self, values: Mapping[str, Array], *, apart: bool = False) -> tuple[Optimum, float]:
-        """The solution with what touches for values of the unknowns, or with all ``apart``, from these, and its error;
-        where something else touches there the error may be larger than it was asked for.
+    def _elsewhere(self, optimum: Optimum) -> str:
+        """Where the loads growing from zero lead to another equilibrium than that of a solution, as on the other side
+        of an obstacle, in words; empty where they do not, or where nothing may touch.
         """
-        pilots = self._pilots(values, apart=apart)
+        settings = Settings(accuracy=self.formulation.accuracy)
+        for i in self._chosen if self.formulation.scene.contacts else ():
+            scene, here = self._scene(i, optimum.iterate.values), optimum.cases[i].solved.fields
+            try:
+                there = asked_mesh(scene, settings, lines=True)[2].fields
+            except SceneError:
+                continue
+            apart = max(float(np.linalg.norm(here.position(node) - there.position(node))) for node in scene.nodes)
+            if apart > ELSEWHERE * scene.size:
+                what = "the loads growing from zero lead to another equilibrium"
+                return labelled(self.formulation.cases[i], f"{what}, {apart:.3g} m away")
+        return ""
+
+    @property
+    def _chosen(self) -> list[int]:
+        """Numbers of the cases that are looked at by statics."""
+        count = len(self.formulation.cases)
+        return sorted({round(x) for x in np.linspace(0, count - 1, min(PILOTS, count))})
+
+    def _solved(self, values: Mapping[str, Array], pilots: dict[int, Solved]) -> tuple[Optimum, float]:
+        """The solution with what touches in pilots for values of the unknowns, from these, and its error; where
+        something else touches there the error may be larger than it was asked for.
+        """
         mesh = _united(self._meshes)
         equations = self._equations(mesh)
         states, places = self._begun(equations, pilots, values)
@@ -485,7 +510,7 @@ class Solving:
             iterate=self._iterate(program, result),
             cases=tuple(cases),
             multipliers=multipliers,
-            notes=tuple(notes),
+            notes=(*touched_notes(self.formulation.scene), *notes),
             mesh=program.equations.mesh,
             equations=program.equations,
             numbers=program.numbers(result.x),

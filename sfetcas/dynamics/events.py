@@ -34,12 +34,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..description.scene import Scene
 from ..errors import SolveError, Status
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mathematics.interpolation import evaluation
 from ..mechanics.equations import State
-from ..mechanics.mesh import Approach
+from ..mechanics.mesh import Approach, Spot
 from ..mechanics.rubbing import STILL, Rubs
+from ..mechanics.spots import thinnest
 from ..mechanics.unilateral import Unilateral
 from .impacts import Collision, Impacts
 from .integrating import SHORTEST, Memory, Passed, Stepper, Taken
@@ -133,6 +135,7 @@ class Events:
         self._patience, self._brief = np.where(np.isfinite(between), CALM, 0), np.zeros(len(parts), int)
         self._rocks, self._small = bool(np.isfinite(between).any()), np.zeros(len(parts), int)
         self._accepted = np.where(self._of_obstacles, late, 0.0)
+        self._narrow = np.array([_narrowness(stepper.system.model.scene, part.spot) for part in parts]) / unit
         self.rows, self.signs = self.system.unilateral.rows, self.system.unilateral.signs
         self._impacts, self.found = Impacts(self.system), list[Event]()
         # When it happened last, how often at the same time before, and how often each row has closed then.
@@ -330,17 +333,31 @@ class Events:
                 return [*([shares[k - 1]] if k > 1 else []), shares[k]]
             if k < len(shares) - 1 and missing[k] < missing[k - 1] and missing[k] <= missing[k + 1]:
                 # Between three of them the parabola through them says where it is least.
-                a, b = missing[k - 1] - missing[k], missing[k + 1] - missing[k]
-                at = float(shares[k] + 0.5 * (a - b) / max(a + b, 1e-300) * (shares[k + 1] - shares[k]))
+                at = _lowest(shares[k - 1 : k + 2], missing[k - 1 : k + 2])
                 lowest = self._interpolated(taken, at)[idle] + self._offset[idle] + ROUNDING
                 if lowest.min() < 0.0:
                     return [shares[k - 1], at] if k > 1 else [at]
         return None
 
     def _course(self, taken: Taken) -> tuple[Array, Array]:
-        """Shares of a step (n,), evenly spaced, and the interpolated openings (n, rows) there."""
-        found = [self._interpolated(taken, share) for share in LOOKED[:-1].tolist()]
-        return LOOKED, np.array([*found, self._opened(taken.after.q, taken.after.y, taken.after.t, taken.after)])
+        """Shares of a step (n,), and the interpolated openings (n, rows) there; nearer to each other where a place may
+        have gone through something round.
+        """
+        shares, found = LOOKED, [self._interpolated(taken, share) for share in LOOKED[:-1].tolist()]
+        values = np.array([*found, self._opened(taken.after.q, taken.after.y, taken.after.t, taken.after)])
+        round_ones = np.flatnonzero(np.isfinite(self._narrow) & (taken.begin.acting == 0.0))
+        for _ in range(FINER if len(round_ones) else 0):
+            own, lengths = values[:, round_ones], np.diff(shares)[:, None]
+            # No place moves faster than the fastest distance says, but for what it does across.
+            moves = ACROSS * (np.abs(np.diff(own, axis=0)) / lengths).max(axis=0) * lengths
+            through = (own[:-1] > 0.0) & (own[1:] > 0.0) & (own[:-1] + own[1:] < moves)
+            between = np.flatnonzero((through & (moves > HIDDEN * self._narrow[round_ones])).any(axis=1))
+            if not len(between):
+                break
+            middle = 0.5 * (shares[between] + shares[between + 1])
+            more = np.array([self._interpolated(taken, share) for share in middle.tolist()])
+            shares, values = np.insert(shares, between + 1, middle), np.insert(values, between + 1, more, axis=0)
+        return shares, values
 
     def _interpolated(self, taken: Taken, share: float) -> Array:
         """The openings (rows,) at a share of a step, see :meth:`interpolated`."""
@@ -671,6 +688,18 @@ class Events:
         return self.system.openings(State(q, y, near.lam, near.unwrapped), t)
 
 
+def _narrowness(scene: Scene, spot: Spot | Approach | None) -> float:
+    """Radius, m, of what is round and stops a place from outside; infinite of all else, which nothing goes through."""
+    return thinnest([scene.obstacles[spot.contact]] if isinstance(spot, Spot) else [])
+
+
+def _lowest(x: Array, y: Array) -> float:
+    """Where the parabola through three points, of which the middle one is lowest, has its minimum."""
+    before, after = x[1] - x[0], x[2] - x[1]
+    falls, rises = (y[0] - y[1]) / before, (y[2] - y[1]) / after
+    return float(x[1] + 0.5 * (falls * after - rises * before) / max(falls + rises, TINY))
+
+
 def _root(function: Callable[[float], float], low: float, high: float, width: float) -> float:
     """Where a function changes its sign."""
     from scipy.optimize import brentq
@@ -741,6 +770,11 @@ PARTS = 4
 
 LOOKED = np.linspace(0.0, 1.0, 9)
 """Shares of a step at which openings, and places, are looked at."""
+
+FINER, ACROSS, HIDDEN = 10, 1.5, 0.5
+"""Times that parts of a step are halved in which a place may have gone through something round; its largest speed over
+that with which its distance changes; share of the radius beyond which what is round may be hidden in such a part.
+"""
 
 ROUNDING = 1e-12
 """Of openings, unit of length or rad."""

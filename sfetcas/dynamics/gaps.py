@@ -146,6 +146,8 @@ class Touching:
         # Places on obstacles are seen from the nodes that carry these.
         self.places = np.array([model.segments.place(spot.place) for spot in self.spots], np.intp)
         names = np.array([spot.contact for spot in self.spots], dtype=object)
+        # Of what is round and stops from outside.
+        self.radii = np.full(len(self.spots), np.inf)
         self._groups = list[_Group]()
         self._carriers, self._turns = (np.full(len(self.spots), GROUND, np.intp) for _ in range(2))
         self._rest = np.array([self._undeformed(scene, spot) for spot in self.spots]).reshape(-1, 3)[:, : self.axes]
@@ -157,6 +159,8 @@ class Touching:
                 turn = model.rotations.node_turn[stop.carrier]
                 self._turns[here] = GROUND if turn is None else turn
             self._rest[here] -= base[: self.axes] / self.unit
+            if stop.kind == "round" and stop.sign > 0.0:
+                self.radii[here] = stop.distance / self.unit
             self._groups.append(_Group(stop, here, (stop.place - base)[: self.axes] / self.unit))
 
     def _undeformed(self, scene: Any, spot: Spot) -> Array:

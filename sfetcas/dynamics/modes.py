@@ -28,7 +28,7 @@ from ..equilibria import statics
 from ..equilibria.meshing import Meshing
 from ..equilibria.settings import Settings
 from ..equilibria.single import finished, solved_from
-from ..equilibria.solution import Equilibrium, heading, heading_in_words
+from ..equilibria.solution import Equilibrium, heading, heading_in_words, touched_notes
 from ..equilibria.stops import solve_stopped
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import TINY, Array, first_of_largest
@@ -442,7 +442,7 @@ class ModalAnalysis:
             return np.zeros(0)
 
     def _answered(self, motion: SmallMotion, found: Eigenmotions, error: float) -> Modes:
-        notes = []
+        notes = [*touched_notes(self.scene)]
         asked = self.meshing.asked
         status = Status.SOLVED if error <= self.accuracy or not asked else Status.SHORT
         if len(found.exponents) < self.count:

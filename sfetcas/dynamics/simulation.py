@@ -29,8 +29,9 @@ from ..mechanics.law_limits import first_beyond_laws
 from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Approach, Mesh
 from ..mechanics.model import Model, assemble
-from ..mechanics.spots import ending_at, fine_enough, spots_of
+from ..mechanics.spots import ending_at, fine_enough, slips_between, spots_of
 from ..mechanics.unilateral import all_stops, rows_of
+from ..solvers.guess import lacks_slack
 from ..stopping import arrived
 from .approaching import Approaching
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
@@ -234,10 +235,10 @@ class Simulation:
         except SolveError as error:
             if not run.instants:
                 check_resisted(equations, _resistance(system, begun))
-            elif self.weightless and error.status is Status.STOPPED:
-                error = SolveError(error.status, f"{error.detail}; {SNAPS}", error.last)
-            elif meeting and error.status is Status.STOPPED:
-                error = SolveError(error.status, f"{error.detail}; {ALONG}", error.last)
+            if error.status is Status.STOPPED:
+                hints = {TAUT: lacks_slack(equations), SNAPS: self.weightless, ALONG: bool(meeting)}
+                if hint := next((words for words, true in hints.items() if true), ""):
+                    error = SolveError(error.status, f"{error.detail}; {hint}", error.last)
             run.failure = error
         beyond = run.failure is not None and run.failure.status in LIMITS
         if not beyond and (watch is None or not watch.ended):
@@ -508,9 +509,10 @@ class Simulation:
         return motion
 
     def _dip_notes(self, run: MeshRun) -> tuple[str, ...]:
-        """Where members dip into obstacles the deepest, of all by more than is accepted."""
+        """Where members dip into obstacles the deepest, of all by more than is accepted; else what may be missed."""
         if not run.dips:
-            return ()
+            missed = slips_between(self.scene, run.instants[0].fields.model.mesh) if run.instants else ""
+            return (missed,) if missed else ()
         when, near = min(run.dips, key=lambda dip: dip[1].gap)
         where = f"members.{near.members[0]} at {near.at[0]:.3g} of its length is {-near.gap:.3g} m inside"
         return (f"at {when:.6g} s {where} contacts.{near.contact}, which stops ends of elements: take more of them",)
@@ -662,6 +664,12 @@ def _resistance(system: StageEquations, begun: InitialState) -> Array:
     stiffness, mass, _, _ = _Beginning(system)(begun.state, np.zeros(layout.lam), np.zeros(layout.factors))
     return np.asarray(stiffness + mass)
 
+
+TAUT = (
+    "a member is straight between places that come no closer, where one that keeps its length cannot bend: let it"
+    " stretch (EA of its section, or stretch = true of its shape), or let one end slide"
+)
+"""What is said of a motion that is lost where closings of straight members are redundant."""
 
 ALONG = "members that lie along each other, or touch at many places, are followed by the integrator 'stepping'"
 """What else to say where members that touch each other are not followed event by event."""

@@ -68,8 +68,10 @@ __all__ = ["Stepping", "by_rows"]
 PENETRATION = 5e-7
 """How far members may penetrate at the end of a step, over their radius."""
 
-STRIDE = 0.5
-"""How far anything moves in a step, over the smallest distance of touching lines, before the step is divided."""
+STRIDE, THINNEST = 0.5, 1e-3
+"""How far anything moves in a step, over the smallest distance of touching lines, or a place that comes near to it over
+the radius of what is round, before the step is divided; smallest such radius, unit of length.
+"""
 
 REACH = 2.0
 """Distance of surfaces at which places are looked at, over how far anything moves in the step without impulses."""
@@ -288,6 +290,8 @@ class Stepping(Integrator):
         if (stride := self._farthest(h * begin.v)) > longest:
             return None
         course = _Course(begin, self._pose(begin.state, begin.x), h, self._factors(begin.t, h))
+        if self._goes_through(course):
+            return None
         ahead, x = self._ahead(course), begin.x + h * begin.v
         pose, reach = self._pose(ahead, x), max(REACH * stride, CLOSE * min(touching.distance, 1.0))
         places = touching.nearby.found(pose.curve, reach)
@@ -310,6 +314,14 @@ class Stepping(Integrator):
             near = Near(end.near.places.fixed().with_more(more), np.concatenate([end.near.spots, missing]))
             end = replace(end, near=near, forces=np.concatenate(parts))
         return None
+
+    def _goes_through(self, course: _Course) -> bool:
+        """Whether a place may go through something round unseen, whose radius it moves by in the step."""
+        touching = self._touching
+        radii = np.maximum(touching.radii, THINNEST)
+        moves = np.linalg.norm(self._displaced(course.h * course.begin.v)[touching.places], axis=1)
+        far = moves > STRIDE * radii
+        return bool(far.any() and (far & (touching.on_obstacles(course.before) < moves)).any())
 
     def _ahead(self, course: _Course) -> State:
         """Where a step would lead at constant rates; a body that rings faster than steps follow begins where it is."""

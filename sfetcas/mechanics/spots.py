@@ -23,7 +23,7 @@ from .mesh import Mesh, Spot, breaks_of
 from .rotations import end_joints
 from .segments import place_within
 
-__all__ = ["ending_at", "fine_enough", "spots_of"]
+__all__ = ["ending_at", "fine_enough", "slips_between", "spots_of", "thinnest"]
 
 
 def spots_of(scene: Scene, mesh: Mesh) -> tuple[Spot, ...]:
@@ -82,8 +82,27 @@ def fine_enough(scene: Scene, mesh: Mesh, accuracy: float, fixed: Collection[str
             softest = float(np.nanmin(section.stiffness(np.linspace(0.0, 1.0, 5))))
             weight = reaching[member].force / line.length
             count = max(count, line.length * (weight / (384.0 * softest * dip)) ** 0.25)
-        cuts[member] = _shortened(mesh.cuts[member], 1.0 / min(max(count, 1.0), MOST))
+        # Of something round whose diameter is less than the places are apart nothing would be seen.
+        seen = min(line.length / (APART * thinnest(stops)), MOST_RIGID if rigid else MOST)
+        cuts[member] = _shortened(mesh.cuts[member], 1.0 / max(min(count, MOST), seen, 1.0))
     return replace(mesh, cuts=cuts)
+
+
+def thinnest(stops: Iterable[Obstacle]) -> float:
+    """The smallest radius, m, of obstacles that are round and stop from outside; infinite where none is."""
+    return min((stop.distance for stop in stops if stop.kind == "round" and stop.sign > 0.0), default=np.inf)
+
+
+def slips_between(scene: Scene, mesh: Mesh) -> str:
+    """Which obstacle may slip through between the places at which it stops a member, in words; empty where none may."""
+    for contact, stop in scene.obstacles.items():
+        for member in members_of(scene.contacts[contact], scene.members):
+            apart = float(np.diff(mesh.cuts[member]).max()) * scene.center_lines[member].length
+            if apart > 2.0 * thinnest([stop]) and list(_places(scene, mesh, member, stop)):
+                message = f"contacts.{contact} stops {member!r} at places that are {apart:.3g} m apart, more than its"
+                mended = "a larger radius" if scene.members[member].type == "rigid" else "more elements"
+                return f"{message} diameter: it may slip through, and {mended} would show it"
+    return ""
 
 
 def ending_at(scene: Scene, mesh: Mesh, places: Iterable[tuple[str, float]]) -> Mesh:
@@ -125,5 +144,12 @@ WITHIN = 0.4
 COARSER = 16.0
 """How much deeper flexible members may dip on the first mesh; halved twice, at what is round by no more than others."""
 
-MOST = 64
-"""Elements of a member at most that this asks for: of more, motions take too long."""
+MOST, MOST_RIGID = 64, 256
+"""Elements of a member at most that this asks for, and places of a rigid one that thin obstacles do: of more, motions
+take too long.
+"""
+
+APART = 1.8
+"""How far the places that are stopped may be apart at most, over the radius of what is round: its diameter, but for a
+tenth.
+"""

@@ -238,7 +238,10 @@ class ParametricEquilibrium:
         except SolveError:
             pass
         else:
-            if not any(touching.kept(first.solver, numbers, answer.outcome).changed()):
+            known = touching.first.answer.fields
+            if start is not None:
+                known = touching.kept(first.solver, start.numbers, start.outcome).rest.fields
+            if touching.may_stay(first.solver, numbers, answer.outcome, known):
                 return answer
         solver, state = touching.anew(numbers)
         if solver not in touching.equilibria:

@@ -16,6 +16,7 @@ from ..equilibria.single import solved_from
 from ..equilibria.statics import solve
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
+from ..mechanics.fields import Fields
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
 from ..solvers.globalised import Outcome
@@ -52,6 +53,13 @@ class Touching:
         own = Prepared(assemble(scene, mesh, assembly=model.assembly, scales=model.scales))  # type: ignore[arg-type]
         loading, state = own.model.loading(scene.analysis.steps[-1]), arguments.program.state(outcome.state)
         return kept_of(scene, self.settings, Solved.taken(own, state, loading))
+
+    def may_stay(self, solver: EquilibriumSolver, numbers: Array, outcome: Outcome, start: Fields) -> bool:
+        """Whether all that touches at an equilibrium pushes, nothing else touches, and from a state that is known
+        no member has passed through anything on the straight way.
+        """
+        kept = self.kept(solver, numbers, outcome)
+        return not any(kept.changed()) and not kept.run.passing.passed(start, kept.rest.fields)
 
     def refuse_doubt(self, solver: EquilibriumSolver, numbers: Array, outcome: Outcome) -> None:
         """Refuse derivatives where they differ to the sides of a change.

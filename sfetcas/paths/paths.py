@@ -22,7 +22,7 @@ from ..description.records import enumerated
 from ..description.remembering import refuse_memory
 from ..description.scene import Scene
 from ..equilibria.settings import Settings, settings_with
-from ..equilibria.solution import Equilibrium, equilibrium
+from ..equilibria.solution import Equilibrium, equilibrium, touched_notes
 from ..equilibria.statics import pilot_of, solve
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.threads import single_threaded
@@ -533,7 +533,7 @@ class PathTracing:
             unit=curve.unit,
             error_estimate=largest if np.isfinite(largest) else None,
             last=last,
-            notes=(*level.notes, *first_beyond_laws(_states(level)), *self._means(curve)),
+            notes=(*touched_notes(self.scene), *level.notes, *first_beyond_laws(_states(level)), *self._means(curve)),
             seconds=self.seconds,
         )
 
