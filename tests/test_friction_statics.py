@@ -587,3 +587,37 @@ def test_a_heavy_rope_hangs_over_a_rough_drum_as_far_as_friction_allows(friction
     # Bending lifts the free end.  Where lines end friction is that of whole elements: 2e-4 of the force here.
     wanted = hanging(stiffness, friction, end=last.position("end")[1])
     assert last.reaction("held")[0][1] == pytest.approx(wanted[1], rel=3e-4)
+
+
+def test_a_rod_that_slides_round_another_one_is_followed_in_long_steps(monkeypatch):
+    """What has slid from where its normal was set up still pushes: it was let go, and steps became hundreds.
+
+    On the friction cone, in balance: what pushes one rod is what bends the other one, and a step back is another way.
+    """
+    table = {
+        "dimension": "space",
+        "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8}},
+        "nodes": {
+            "A": {"position": [0, 0, 0.05], "support": "clamped"},
+            "B": {"position": [1, 0, 0.05]},
+            "C": {"position": [0.8, -0.65, 0], "support": "clamped"},
+            "D": {"position": [0.8, 0.65, 0]},
+        },
+        "members": {"a": {"nodes": ["A", "B"], "section": "s"}, "b": {"nodes": ["C", "D"], "section": "s"}},
+        "loads": {"F": {"type": "force", "node": "B", "value": [0, 0.5, -2]}},
+        "contacts": {"c": {"type": "members", "members": ["a", "b"], "radius": 0.02, "friction": 0.3}},
+        "analysis": {"accuracy": 1e-4},
+    }
+    steps, stepped = [], MemberContact.stepped
+    monkeypatch.setattr(MemberContact, "stepped", lambda self, *a, **k: steps.append(0) or stepped(self, *a, **k))
+    scene = Scene.from_dict(table)
+    last = solve(scene).last
+    assert len(steps) < 40
+    told = last.contacts["c"]
+    assert last.reaction("C")[0] == pytest.approx(told["force"], abs=1e-9)
+    push = told["force"] - told["friction"]
+    assert not told["sticking"]
+    assert np.linalg.norm(told["friction"]) == pytest.approx(0.3 * np.linalg.norm(push), rel=1e-9)
+    # In other steps it slides nearly the same way.
+    finer = solve(scene.replace({"analysis.steps": [0.5, 1.0]})).last
+    assert last.position("B") == pytest.approx(finer.position("B"), abs=2e-4)

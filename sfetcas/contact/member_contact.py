@@ -772,6 +772,8 @@ class MemberContact:
         """Whether points, where they are now, are where nothing is nearest, or would have to pull."""
         lost = np.array([self._lost(found.fields, point) for point in now], dtype=bool)
         rounding = LASTING * np.abs(pushes).max(initial=0.0)
+        # What is rough and pushes, but has slid from where its normal was set up, is set up anew from where it is.
+        lost &= ~((pushes > rounding) & np.array([len(p.at) == 2 and p.grip is not None for p in now], dtype=bool))
         # A corner on an edge is pushed between two normals.
         pushes = np.where([point.met and not any(point.slides) for point in now], 0.0, pushes)
         # Along a line what does not push is left; what slides there may have to stay until it is known.
