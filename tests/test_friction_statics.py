@@ -1,6 +1,8 @@
 """Coulomb friction where members touch, in statics along the order of the steps."""
 
 from dataclasses import replace
+from pathlib import Path
+from runpy import run_path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from sfetcas.contact.gripping import CENTRED
 from sfetcas.contact.member_contact import MemberContact
 from sfetcas.mechanics.mesh import ContactPoint, Grip
 
+PROBLEMS = Path(__file__).parent.parent / "problems"
 FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}
 TIP_FLOOR = {"type": "plane", "point": [0, -0.3], "normal": [0, 1], "members": "all"}
 
@@ -621,3 +624,29 @@ def test_a_rod_that_slides_round_another_one_is_followed_in_long_steps(monkeypat
     # In other steps it slides nearly the same way.
     finer = solve(scene.replace({"analysis.steps": [0.5, 1.0]})).last
     assert last.position("B") == pytest.approx(finer.position("B"), abs=2e-4)
+
+
+def test_a_rough_knot_that_loosens_and_tightens_is_within_what_friction_holds():
+    """T h^2/B = e^4/2 (1 - k e) -+ mu s e^3 in a trefoil that is made straight by nature, and then pulled.
+
+    While the drawn curvature goes it is held as tightly as friction lets it, then it slides the other way.  Without
+    friction k = 0.278, and the work of the pushes on the slips of a little more pull gives s = 0.525 + 1.2 e.
+    """
+    table = run_path(str(PROBLEMS / "trefoil_knot.py"))
+    radius, pull, mu = 0.05, table["PULL"], 0.02
+    scene = table["scene"](radius).to_dict()
+    scene["contacts"]["itself"]["friction"] = mu
+    scene["histories"] = {"straight": {"t": [0, 1], "value": [0, 1]}}
+    for actuation in scene["actuations"].values():
+        actuation["history"] = "straight"
+    scene["analysis"]["steps"] = [1.0, 1.5]
+    shares = []
+    for step in solve(Scene.from_dict(scene)).steps:
+        at = np.linspace(0.0, 1.0, 401)
+        moment = step.along("right", at)["moment"]
+        bending = 0.5 * np.einsum("ni,ni->n", moment, moment) / table["STIFFNESS"]
+        e = np.sqrt(radius / (np.pi * table["STIFFNESS"] / (2.0 * np.trapezoid(bending, table["HALF"] * at))))
+        beyond = pull * step.factor * radius**2 / table["STIFFNESS"] - 0.5 * e**4 * (1.0 - 0.278 * e)
+        shares.append(beyond / (mu * e**3 * (0.525 + 1.2 * e)))
+    # Pushes change with friction, by mu times the angle by which the rods are wound round each other.
+    assert shares == pytest.approx([-1.0, 1.0], abs=0.1)

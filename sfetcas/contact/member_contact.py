@@ -209,6 +209,8 @@ class MemberContact:
         Whether an equilibrium is near enough to be the one that is looked for: with friction one may be far beyond.
     at_once : bool
         Whether it is found all at once, too, what pushes along lines between members.
+    standing, stood : bool
+        Whether what begins to touch between rough members stays on the first one, and did so in the last step.
     jammed : bool
         Whether in the last step something would have had to give way by much, as what friction locks.
     """
@@ -233,7 +235,7 @@ class MemberContact:
         self.passing = Passing(scene, self.closest, self.edges, self.tolerance)
         self.across: Callable[[Prepared], tuple[Curve, Tangent]] | None = None
         self.within: Callable[[Solved], bool] | None = None
-        self.jammed = self.at_once = False
+        self.jammed = self.at_once = self.standing = self.stood = False
 
     def hold(self, fixed: Collection[str]) -> None:
         """Take the mesh of other members for prescribed."""
@@ -625,9 +627,14 @@ class MemberContact:
 
         Where it is known where lines end these places go on sliding; where that leads nowhere, or is not known, forces
         at ends of elements show where they end, and these slide from there.  Members touch each other at places that
-        slide; where these lead nowhere, and the members are as near between them, along a line.
+        slide; where these lead nowhere, and the members are as near between them, along a line.  Rough ones then touch
+        at places that stay on the first member.
         """
-        lines, found = self.lines.keys, None
+        lines = self.lines.keys
+        # Those that stood in the step before go on so.
+        found = self._standing(mesh, points, source, way) if self.stood and not drag else None
+        if found is not None:
+            return found
         known = self.lines.ends_slide(points)
         if known:
             found = self._resolved(mesh, points, source, way, drag, True)
@@ -661,6 +668,21 @@ class MemberContact:
             self.lines.keys = lines - between
             found = self._resolved(mesh, points, source, way, drag, False)
         self.lines.keys = lines if found is None else self.lines.keys
+        if found is None and self.scene.rubs and not (drag or self.patient or self.stood):
+            found = self._standing(mesh, points, source, way)
+        return found
+
+    def _standing(self, mesh: Mesh, points: Points, source: Solved, way: Way) -> Solved | None:
+        """As :meth:`resolved`, with places that begin to touch between rough members staying on the first one.
+
+        Along a line that begins at a point, as in the braid of a knot, places beside it would slide back to that.
+        """
+        lines, self.standing = self.lines.keys, True
+        try:
+            found = self._resolved(mesh, points, source, way, 0.0, False)
+        finally:
+            self.standing = False
+        self.lines.keys, self.stood = lines if found is None else self.lines.keys, found is not None
         return found
 
     def _resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float, ends: bool) -> Solved | None:
@@ -844,6 +866,8 @@ class MemberContact:
             free = [0.0 < x < 1.0 or (0.5 - x) * slope < -lies for x, slope in zip(at, slopes.tolist(), strict=True)]
         ends_line = all(point.sides) and not point.line and (point.pair, point.at[0]) in ends
         slides = (free[0] and (ends_line or not self.lines.has(point)), *free[1:])
+        if self.standing and point.grip is not None and len(at) == 2 and point.slides != (True, True):
+            slides = (False, True)
         stays = not point.new and slides == point.slides
         return point if stays else replace(point, slides=slides, normal=normal, new=False)
 
@@ -903,6 +927,7 @@ class MemberContact:
             The way leads beyond what the scene describes, see :meth:`.Fields.beyond_limits`.
         """
         self.jumps, self.beside, self.falls, mesh = [], [], 0, replace(start.model.mesh, points=())
+        self.stood = False
         unstable: _Step | None = None
         self.patient = False
         now, step, left, pace = _Step(0.0, start), self.first, -1.0, 0.0
