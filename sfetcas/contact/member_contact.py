@@ -867,7 +867,7 @@ class MemberContact:
         ends_line = all(point.sides) and not point.line and (point.pair, point.at[0]) in ends
         slides = (free[0] and (ends_line or not self.lines.has(point)), *free[1:])
         if self.standing and point.grip is not None and len(at) == 2 and point.slides != (True, True):
-            slides = (False, True)
+            slides = (False, slides[1])
         stays = not point.new and slides == point.slides
         return point if stays else replace(point, slides=slides, normal=normal, new=False)
 
