@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sfetcas.mathematics import linear
+from sfetcas.mathematics.core import core
 from sfetcas.mathematics.linear import InertiaSolver, SparseSolver
 
 
@@ -83,7 +84,7 @@ def test_singular_matrices_have_no_solution(rows, block):
     solver, entries = solver_of(matrix, rows=rows, symmetric=False)
     solver.factor(np.ones(len(entries)))
     solver.factor(entries)
-    if block:
+    if block or core() is not None:
         with pytest.raises(np.linalg.LinAlgError, match="singular"):
             solver.solve(np.arange(200.0))
     else:
@@ -114,7 +115,12 @@ def test_negative_eigenvalues_are_counted_where_factors_miss_little(soft):
     matrix[np.diag_indices(320)] += np.repeat([soft, -soft], [240, 80])
     row, column = np.nonzero((matrix != 0.0).T | np.eye(len(matrix), dtype=bool))[::-1]
     solver = InertiaSolver(320, row, column)
-    solver.factor(matrix[row, column])
+    try:
+        solver.factor(matrix[row, column])
+    except np.linalg.LinAlgError:
+        # In some orders a pivot is lost in rounding altogether.
+        assert soft < 1e-9
+        return
     if soft > 1e-9:
         assert solver.missed() < 1e-3
         assert solver.negative() == (np.linalg.eigvalsh(matrix) < 0.0).sum() == 80

@@ -242,7 +242,9 @@ def test_straight_strip_whose_ends_come_nearer_by_a_history_bends_towards_a_plat
     # The same equations on the same mesh.
     np.testing.assert_allclose(by_history.position("C"), evenly.position("C"), atol=1e-9)
     assert by_history.position("C") == pytest.approx([0.49, 0.08, 0.0], abs=1e-4)
-    np.testing.assert_allclose(force_of(by_history), force_of(evenly), rtol=1e-8)
+    # Along the plate there is none, to rounding.
+    size = np.linalg.norm(force_of(evenly))
+    np.testing.assert_allclose(force_of(by_history), force_of(evenly), rtol=1e-8, atol=1e-16 * size)
 
 
 @pytest.mark.parametrize("spread", [False, True])

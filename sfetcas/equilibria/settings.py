@@ -10,6 +10,7 @@ from ..description.records import say, unknown
 from ..description.showing import made
 from ..description.task import Analysis, checked_accuracy
 from ..errors import SceneError
+from ..mathematics.core import core
 from ..mathematics.kernels import Kernels
 from ..mechanics.elements import ELEMENTS
 from .single import SolverName
@@ -40,7 +41,8 @@ class Settings:
     solver : str
         ``ipopt``; or ``newton``: globalised Newton's method, which is faster, and IPOPT where that fails.
     kernels : str
-        Element functions: ``compiled`` to C, ``interpreted`` by CasADi, or ``auto``: compiled where that pays.
+        How equations are evaluated: by the ``core`` in C, or in Python with element functions ``compiled`` to C or
+        ``interpreted`` by CasADi; ``auto``: by the core if there is one, else compiled where that pays.
     runs : int or None
         Largest number of Newton runs of a search for several equilibria, for each factor; None chooses by the size.
     """
@@ -73,8 +75,11 @@ class Settings:
             raise SceneError(f"runs: found {self.runs}, accepted: 0 to 1000000")
         if self.solver not in ("ipopt", "newton"):
             raise SceneError(f"solver: found {self.solver!r}, accepted: ipopt, newton")
-        if self.kernels not in ("auto", "compiled", "interpreted"):
-            raise SceneError(f"kernels: found {self.kernels!r}, accepted: auto, compiled, interpreted")
+        if self.kernels not in ("auto", "core", "compiled", "interpreted"):
+            raise SceneError(f"kernels: found {self.kernels!r}, accepted: auto, core, compiled, interpreted")
+        if self.kernels == "core" and core() is None:
+            accepted = "auto, or an installation of sfetcas where there is a C compiler"
+            raise SceneError(f"kernels: found 'core', and there is none here, accepted: {accepted}")
         if self.assembly not in ("auto", "closing", "nodal"):
             raise SceneError(f"assembly: found {self.assembly!r}, accepted: auto, closing, nodal")
 

@@ -32,10 +32,10 @@ from ..files import UnreadableError, read_file
 from .arrays import Array
 from .source import loadable
 
-__all__ = ["Batch", "Kernels", "cache_folder", "chosen", "compiled", "interpreted"]
+__all__ = ["LARGEST", "Batch", "Kernels", "cache_folder", "chosen", "compiled", "interpreted", "private"]
 
-Kernels = Literal["auto", "compiled", "interpreted"]
-"""How element functions are evaluated."""
+Kernels = Literal["auto", "core", "compiled", "interpreted"]
+"""How equations are evaluated: by the core, or in Python with functions of elements compiled or interpreted."""
 
 FLAGS = ("-fPIC", "-shared", "-fno-math-errno")
 
@@ -101,7 +101,7 @@ def _named(key: str, library: bytes) -> str:
     return f"{key}{hashlib.sha256(library).hexdigest()[:32]}.so"
 
 
-def _private(folder: Path) -> bool:
+def private(folder: Path) -> bool:
     """Whether only this user, or the one who rules the machine, can have put anything into a folder."""
     found = folder.stat()
     if not stat.S_ISDIR(found.st_mode):
@@ -122,7 +122,7 @@ def _private(folder: Path) -> bool:
 @functools.lru_cache(maxsize=LOADED)
 def _loaded(name: str, key: str, folder: Path) -> ca.Function:
     """The function in the library of a key; OSError where there is none that is whole and can be loaded."""
-    if _private(folder):
+    if private(folder):
         for path in (folder / entry for entry in os.listdir(folder) if entry.startswith(key)):
             with contextlib.suppress(UnreadableError, RuntimeError):
                 if _named(key, read_file(path, LARGEST)) == path.name:
@@ -153,7 +153,7 @@ def _compile(function: ca.Function, place: Path | None) -> bool:
         return False
     try:
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if not _private(place):
+        if not private(place):
             return False
         with tempfile.TemporaryDirectory(dir=place) as folder:
             source, library = Path(folder) / f"{function.name()}.c", Path(folder) / "library.so"

@@ -6,6 +6,7 @@ Small systems go to LAPACK, larger ones to the solvers that come with CasADi; th
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import functools
 import io
 
@@ -14,10 +15,22 @@ import numpy as np
 
 from .. import tolerances
 from .arrays import TINY, Array, Index
+from .core import Factors, Pivoted, System, core, doubles
 from .keeping import kept
 from .kernels import Batch
 
-__all__ = ["InertiaSolver", "Product", "SparseMap", "SparseSolver", "blurred", "pattern", "places_of", "smallest"]
+__all__ = [
+    "NO_ROOM",
+    "CoreSystem",
+    "InertiaSolver",
+    "Product",
+    "SparseMap",
+    "SparseSolver",
+    "blurred",
+    "pattern",
+    "places_of",
+    "smallest",
+]
 
 DENSE = 150
 """Up to this size LAPACK on the full matrix is faster than a sparse factorisation (measured)."""
@@ -35,11 +48,15 @@ class SparseMap:
 
     def __init__(self, row: Array, column: Array, value: Array, shape: tuple[int, int]) -> None:
         self.shape = shape
-        places, inverse = np.unique(np.asarray(row, dtype=np.int64) * shape[1] + column, return_inverse=True)
-        summed = np.bincount(inverse.ravel(), weights=value, minlength=len(places))
-        keep = summed != 0.0
-        self.row, self.column = (part.astype(np.intp) for part in np.divmod(places[keep], max(shape[1], 1)))
-        self.value = summed[keep]
+        places = np.asarray(row, dtype=np.int64) * shape[1] + column
+        if not ((places[1:] > places[:-1]).all() and value.all()):
+            places, inverse = np.unique(places, return_inverse=True)
+            value = np.bincount(inverse.ravel(), weights=value, minlength=len(places))
+            keep = value != 0.0
+            places, value = places[keep], value[keep]
+            row, column = np.divmod(places, max(shape[1], 1))
+        self.row, self.column = np.asarray(row, np.intp), np.asarray(column, np.intp)
+        self.value = np.asarray(value, dtype=float)
         # Small matrices are faster in full.
         self._full = self.full() if shape[0] * shape[1] <= FULL else None
 
@@ -100,6 +117,8 @@ class Filled:
     ----------
     row, column : ndarray
         The places, column by column.
+    every : bool
+        Whether all places are taken, as there are few.
     grown : bool
         Whether the last matrix has entries elsewhere than those before.
     """
@@ -107,15 +126,15 @@ class Filled:
     def __init__(self, row: Array, column: Array, *, symmetric: bool = True) -> None:
         self.row, self.column, self._row, self._column = row, column, row, column
         # Where there are few, looking for zeros costs more than they do.
-        self._every, self._known, self.grown = len(row) <= FEW_ENTRIES, row == column, False
-        if not self._every:
+        self.every, self._known, self.grown = len(row) <= FEW_ENTRIES, row == column, False
+        if not self.every:
             self.row, self.column = row[self._known], column[self._known]
             # Rounding may leave a zero on one side of the diagonal alone.
             self._across = np.lexsort((column, row)) if symmetric else np.arange(len(row))
 
     def taken(self, entries: Array) -> Array:
         """Of the entries of a matrix those at the places."""
-        if self._every:
+        if self.every:
             return entries
         filled = entries != 0.0
         filled |= filled[self._across]
@@ -157,16 +176,28 @@ class SparseSolver:
         self._rows, self._lost = rows, 0
         self._sides = np.repeat([tolerances.SOFT, -tolerances.SOFT], [n - rows, rows])
         self._filled = Filled(row, column, symmetric=symmetric)
+        self._core = core()
 
     def factor(self, entries: Array) -> None:
         """Set the entries of the matrix; it is factorised by the next :meth:`solve`."""
         if self._small:
-            self._matrix: Array = np.zeros((self.n, self.n))
-            self._matrix[self._row, self._column] = entries
+            self._entries = entries
             return
-        self._matrix = self._filled.taken(entries)
+        self._matrix: Array = self._filled.taken(entries)
         if self._filled.grown:
             self.__dict__.pop("_sparse", None)
+            self.__dict__.pop("_system", None)
+
+    @functools.cached_property
+    def _system(self) -> CoreSystem:
+        assert self._core is not None
+        last = self._rows if self._few else 0
+        return CoreSystem(self._core, self.n, self._filled.row, self._filled.column, self._sides, last, self._symmetric)
+
+    @property
+    def of_core(self) -> CoreSystem | None:
+        """The system of the core that takes all entries of the pattern; None where there is none."""
+        return self._system if self._core is not None and self._filled.every and self.n else None
 
     @functools.cached_property
     def _sparse(self) -> _Sparse:
@@ -180,8 +211,12 @@ class SparseSolver:
         numpy.linalg.LinAlgError
             The matrix is singular.
         """
+        if self._core is not None and self.n:
+            return self._system.solved(self._entries if self._small else self._matrix, b)
         if self._small:
-            return np.asarray(np.linalg.solve(self._matrix, b))
+            full = np.zeros((self.n, self.n))
+            full[self._row, self._column] = self._entries
+            return np.asarray(np.linalg.solve(full, b))
         columns, sparse = b.reshape(self.n, -1), self._sparse
         if self._few:
             return sparse.rows_last.solve(self._matrix, columns).reshape(b.shape)
@@ -271,9 +306,7 @@ class _Factors:
 
     def __init__(self, plugin: str, n: int, row: Array, column: Array, last: int = 0) -> None:
         self._plugin = plugin
-        first = (row < n - last) & (column < n - last)
-        own = pattern(n - last, row[first], column[first])
-        self._order = np.append(np.array((own + own.T).amd(), dtype=np.intp), np.arange(n - last, n))
+        self._order = _sparse_order(n, row, column, last)
         place = np.argsort(self._order)
         row, column = place[row], place[column]
         self._entries = np.lexsort((row, column))
@@ -372,6 +405,161 @@ YIELDING = 1e-3
 """Softness of rows over that of weights of 1: each round leaves this share of what is missing, or less."""
 
 
+class CoreFactors:
+    """Factors by the core of symmetric matrices of one pattern, without pivoting.
+
+    Parameters
+    ----------
+    library : CDLL
+        The core.
+    n : int
+    row, column : ndarray
+        Positions of the entries, column by column, on both sides of the diagonal.
+
+    Attributes
+    ----------
+    tables : list of ndarray
+        Of the matrix: where columns start, rows of entries; the order in which unknowns are eliminated, its inverse.
+    address : int
+        Where the core finds them.
+    """
+
+    def __init__(self, library: ctypes.CDLL, n: int, row: Array, column: Array) -> None:
+        self._library = library
+        order = _sparse_order(n, row, column).astype(np.intc)
+        place = np.argsort(order).astype(np.intc)
+        start = np.searchsorted(column, np.arange(n + 1)).astype(np.intc)
+        self.tables = tables = [start, np.ascontiguousarray(row, dtype=np.intc), order, place]
+        memory = [np.zeros(size, np.intc) for size in (n, n + 1, 0, 0, 0, n, n, n)] + [np.zeros(n)]
+        memory[2:5] = [np.zeros(0, np.intc), np.zeros(0), np.zeros(n)]
+        self._arrays = [*tables, *memory]
+        addresses = [part.ctypes.data for part in self._arrays]
+        self._factors = Factors(n, len(row), *addresses[:4], 0, *addresses[4:])
+        self.address = ctypes.addressof(self._factors)
+        library.sf_count(self.address)
+        filled = self._factors.filled
+        self._lower = (np.zeros(filled, np.intc), np.zeros(filled))
+        self._factors.lower_row, self._factors.value = (part.ctypes.data for part in self._lower)
+        self._work, self._negative = np.zeros(n), ctypes.c_int()
+
+    def factor(self, entries: Array) -> int:
+        """Factorise the matrix with these entries; the number of its negative eigenvalues.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            A pivot is zero, or not finite.
+        """
+        entries = doubles(entries)
+        if self._library.sf_factorise(self.address, entries.ctypes.data, ctypes.addressof(self._negative)):
+            raise np.linalg.LinAlgError("no factors without pivots")
+        return self._negative.value
+
+    def solve(self, b: Array) -> Array:
+        """Solution (n, k) for the matrix that was factorised last."""
+        x = b.T.copy()
+        self._library.sf_backward(self.address, len(x), x.ctypes.data, self._work.ctypes.data)
+        return x.T
+
+
+class CoreSystem:
+    """Solutions by the core for matrices of one pattern, as :class:`SparseSolver` says.
+
+    Parameters
+    ----------
+    library, n, row, column
+        As of :class:`CoreFactors`; a matrix that is not symmetric need not have entries on both sides.
+    soft : ndarray (n,)
+        What is added to the diagonal of symmetric matrices for factors without pivoting.
+    last : int
+        Unknowns that are eliminated last where there is pivoting.
+    symmetric : bool
+
+    Attributes
+    ----------
+    address : int
+        Where the core finds it.
+    """
+
+    def __init__(
+        self, library: ctypes.CDLL, n: int, row: Array, column: Array, soft: Array, last: int, symmetric: bool
+    ) -> None:
+        self._library, self._n, self._soft = library, n, doubles(soft)
+        self._factors = CoreFactors(library, n, row, column)
+        order = _sparse_order(n, row, column, last).astype(np.intc)
+        self._whole = [np.zeros(n, np.intc) for _ in range(6)] + [np.zeros(n + 1, np.intc) for _ in range(2)]
+        self._numbers = [np.zeros(n), np.zeros(n)]
+        self._order, self._room = order, 0
+        self._pivoted = Pivoted(n)
+        start, rows = self._factors.tables[:2]
+        arrays: list[Array] = [start, rows, order, *self._whole, *self._numbers]
+        for name, part in zip(PIVOTED, arrays, strict=True):
+            setattr(self._pivoted, name, part.ctypes.data)
+        self.make_room(8 * len(row) + 2 * n)
+        addresses = (self._factors.address, ctypes.addressof(self._pivoted), self._soft.ctypes.data)
+        self._system = System(*addresses, int(symmetric), 0, OFTEN, SOLVED)
+        self.address = ctypes.addressof(self._system)
+        self._work = np.zeros(4 * n)
+
+    def make_room(self, room: int = 0) -> None:
+        """Room for factors with pivots; by default twice as much as there is."""
+        self._room = room or 2 * self._room
+        self._memory = [np.empty(self._room, kind) for kind in (np.intc, np.intc, float, float)]
+        self._pivoted.room = self._room
+        for name, part in zip(("lower_row", "upper_row", "lower_value", "upper_value"), self._memory, strict=True):
+            setattr(self._pivoted, name, part.ctypes.data)
+
+    def solved(self, entries: Array, b: Array) -> Array:
+        """Solution for b (n,) or (n, k).
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            The matrix is singular.
+        """
+        entries, right = doubles(entries), doubles(b.T)
+        x, count = np.empty(right.shape), 1 if b.ndim == 1 else b.shape[1]
+        while True:
+            handed = (entries.ctypes.data, count, right.ctypes.data, x.ctypes.data, self._work.ctypes.data)
+            broken = self._library.sf_solve(self.address, *handed)
+            if broken == NO_ROOM:
+                self.make_room()
+                continue
+            if broken:
+                raise np.linalg.LinAlgError("singular matrix")
+            return x.T
+
+
+# fmt: off
+PIVOTED = (
+    "start", "row", "order", "place", "row_of", "mark", "reached", "stack", "at", "lower", "upper", "pivot", "x",
+)
+# fmt: on
+"""Arrays of factors with pivots whose size is known."""
+
+NO_ROOM = 2
+"""What the core returns where factors need more memory."""
+
+
+def _sparse_order(n: int, row: Array, column: Array, last: int = 0) -> Index:
+    """The unknowns (n,) in an order that keeps factors sparse; the ``last`` ones, which may be no pivots, last."""
+    if len(row) > FEW_ENTRIES:
+        return _found_order(n, row, column, last)
+    return _kept_order(n, np.asarray(row, np.int64).tobytes(), np.asarray(column, np.int64).tobytes(), last)
+
+
+@functools.lru_cache(maxsize=128)
+def _kept_order(n: int, row: bytes, column: bytes, last: int) -> Index:
+    """The order of a small pattern: one comes many times."""
+    return _found_order(n, np.frombuffer(row, np.int64), np.frombuffer(column, np.int64), last)
+
+
+def _found_order(n: int, row: Array, column: Array, last: int) -> Index:
+    first = (row < n - last) & (column < n - last)
+    own = pattern(n - last, row[first], column[first])
+    return np.append(np.array((own + own.T).amd(), dtype=np.intp), np.arange(n - last, n))
+
+
 class InertiaSolver:
     """Factors that count negative eigenvalues of symmetric matrices of one pattern.
 
@@ -384,13 +572,21 @@ class InertiaSolver:
     """
 
     def __init__(self, n: int, row: Array, column: Array) -> None:
-        self._n, self._filled = n, Filled(row, column)
+        self._n, self._filled, self._core = n, Filled(row, column), core()
+
+    @functools.cached_property
+    def _factors(self) -> CoreFactors:
+        assert self._core is not None
+        return CoreFactors(self._core, self._n, self._filled.row, self._filled.column)
 
     def factor(self, entries: Array) -> None:
         """Factorise the matrix with these entries."""
         taken = self._filled.taken(entries)
-        for name in ("_solver", "_sparsity") if self._filled.grown else ():
+        for name in ("_solver", "_sparsity", "_factors") if self._filled.grown else ():
             self.__dict__.pop(name, None)
+        if self._core is not None:
+            self._taken, self._negative = taken, self._factors.factor(taken)
+            return
         self._matrix = ca.DM(self._sparsity, taken)
         try:
             with _unsaid():
@@ -410,10 +606,12 @@ class InertiaSolver:
 
     def negative(self) -> int:
         """Number of negative eigenvalues of the matrix that was factorised last."""
-        return int(self._solver.neig(self._matrix))
+        return self._negative if self._core is not None else int(self._solver.neig(self._matrix))
 
     def solve(self, b: Array) -> Array:
         """Solution (n, k) for the matrix that was factorised last."""
+        if self._core is not None:
+            return self._factors.solve(b)
         try:
             with _unsaid():
                 return np.asarray(self._solver.solve(self._matrix, ca.DM(b)).full())
@@ -427,9 +625,15 @@ class InertiaSolver:
         """
         left, sizes = np.ones((self._n, 1)), [np.inf]
         for _ in range(MISSES):
-            left = left - ca.mtimes(self._matrix, ca.DM(self.solve(left))).full()
+            left = left - self._times(self.solve(left))
             sizes.append(float(np.linalg.norm(left)))
         return 0.0 if sizes[-1] <= BLURRED * np.sqrt(self._n) else sizes[-1] / max(sizes[-2], TINY)
+
+    def _times(self, x: Array) -> Array:
+        if self._core is None:
+            return np.asarray(ca.mtimes(self._matrix, ca.DM(x)).full())
+        given = self._taken * x[self._filled.column, 0]
+        return np.bincount(self._filled.row, weights=given, minlength=self._n)[:, None]
 
 
 MISSES, BLURRED = 3, 1e-8

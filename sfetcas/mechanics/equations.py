@@ -20,20 +20,21 @@ import numpy as np
 from .. import tolerances
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array, Index
+from ..mathematics.core import Border, Limits, Report
 from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import SparseSolver
 from .batches import GroupBatch, at_rest
+from .evaluation import UNLOADED, CorePoint, core_model
+from .layout import Layout, layout_of
 from .load_terms import present
 from .loading import Loading
 from .mass_centers import along_elements
 from .model import Model
 from .reactions import Reactions
 from .rotations import RotationFreedom
-from .tables import Tables
 from .terms import Group, pulls_of, rotation_gradient
 
 __all__ = [
-    "UNLOADED",
     "Equations",
     "Point",
     "State",
@@ -46,9 +47,6 @@ __all__ = [
 
 MOST_CLOSED = 4_000_000
 """Entries of a matrix of closings up to which displacements are chosen by them."""
-
-UNLOADED = 1e-6
-"""Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +108,8 @@ class Equations:
     rotation_unknowns, displacement_unknowns : int
     number : ndarray (rotations, width)
         Unknown of each component of a rotation, see :class:`~sfetcas.mechanics.tables.Tables`.
+    layout : Layout
+        What the structure alone says of the equations.
     row, column, diagonal : ndarray
         Rows and columns of the entries of the Newton matrix; which of them are on the diagonal.
     noise : ndarray (total,)
@@ -122,40 +122,45 @@ class Equations:
         self.redundant: bool | None = None
         # The last entries of the matrix for which that was asked, how exactly, and what was found.
         self.loose: tuple[Array, float, Array] | None = None
-        self.tables = tables = Tables(model)
+        self.layout = layout = layout_of(model)
+        self.tables = tables = layout.tables_of(model)
+        self.row, self.column, self.diagonal = layout.row, layout.column, layout.diagonal
         self.number, self.place_number = tables.number, tables.place_number
         self.rotation_unknowns, self.displacement_unknowns = tables.rotation_unknowns, tables.displacement_unknowns
         self.unknowns, self.rows, self.total = tables.unknowns, tables.rows, tables.total
         self._owner, self._first = model.segments.owner, model.segments.first
         # Elements are what there may be thousands of: their functions alone are worth compiling.
         self._terms = [
-            _Terms(tables, number, kernels if number == 0 else "interpreted", evaluations)
+            _Terms(layout, model, number, kernels if number == 0 else "interpreted", evaluations)
             for number in range(len(model.terms))
         ]
-        self._retained = self.place_number[(model.positions.retained >= 0).all(axis=1)]
-        self._pattern()
+        self._given: list[tuple[Loading, Array]] = []
+        self.noise = np.zeros(self.total)
+        self._core = core_model(layout, model, self.noise) if kernels in ("auto", "core") else None
         self._judge()
 
     def _judge(self) -> None:
         """What rounding leaves of each residual in the unloaded scene."""
         # A hundredth of the stiffness against turning a node: 1e-14 of it is what rounding of rotations leaves.
-        self.noise = np.abs(self.elastic_entries()[self.diagonal]) * 0.01
+        self.noise[...] = np.abs(self.elastic_entries()[self.diagonal]) * 0.01
         for group in self._terms[1:]:
             group.add_noise(self.noise)
         # Sections turn: about any fixed axis rounding is that of the stiffest one, also where nothing resists a turn.
         free = self.number[(self.number >= 0).all(axis=1)]
         self.noise[free] = self.noise[free].max(axis=1, keepdims=True)
-        self.noise[self._retained] = self.noise[self._retained].max(axis=1, keepdims=True)
+        retained = self.layout.retained
+        self.noise[retained] = self.noise[retained].max(axis=1, keepdims=True)
         self.noise[self.unknowns :] = 1.0
 
     def remembering(self, model: Model) -> Equations:
         """The same equations of a model that differs by what its members remember alone."""
         found = copy.copy(self)
-        found.model, found.tables = model, copy.copy(self.tables)
-        found.tables.model = model
+        found.model, found.tables, found._given = model, self.layout.tables_of(model), []
+        found._core = None if self._core is None else self._core.of(model)
         pairs = enumerate(zip(self._terms, model.terms, strict=True))
         found._terms = [
-            _Terms(found.tables, i, "interpreted", 1.0) if group.kind.memory else terms for i, (terms, group) in pairs
+            _Terms(self.layout, model, i, "interpreted", 1.0) if group.kind.memory else terms
+            for i, (terms, group) in pairs
         ]
         return found
 
@@ -179,15 +184,11 @@ class Equations:
         unknown = tables.unknown[np.concatenate([part[part >= 0] for part in sides])]
         return np.unique(unknown[unknown >= self.rotation_unknowns])
 
-    @functools.cached_property
-    def _transposed(self) -> Index:
-        return np.lexsort((self.column, self.row))
-
     def symmetric(self, point: Point) -> Point:
         """The point with the symmetric part of the Newton matrix; only under pressure is that another matrix."""
         if self.model.has_potential:
             return point
-        return replace(point, entries=0.5 * (point.entries + point.entries[self._transposed]))
+        return replace(point, entries=0.5 * (point.entries + point.entries[self.layout.transposed]))
 
     @functools.cached_property
     def mass(self) -> Array:
@@ -214,43 +215,27 @@ class Equations:
         """Names of the constraint rows: loop closures, then joints."""
         return self.model.row_names
 
-    # -- pattern of the Newton matrix -----------------------------------------------------------
-
-    def _pattern(self) -> None:
-        """Rows and columns of the matrix, and where each contribution goes among its entries."""
-        row, column, weight, self._entry = self.tables.whole
-        keys = column * self.total + row
-        # What follows has entries on one side of the diagonal alone; of pressure the symmetric part is taken.
-        mirrored = () if self.model.has_potential or not self.model.conservative else (row * self.total + column,)
-        places, inverse = np.unique(np.concatenate([keys, *mirrored]), return_inverse=True)
-        self._to_entry, self._weight = inverse[: len(keys)], weight
-        self.row, self.column = places % self.total, places // self.total
-        self.diagonal = np.flatnonzero(self.row == self.column)
-        tables = self.tables
-        cells = np.concatenate([sides.ravel() for sides in tables.sides])
-        unknown = np.where(cells < 0, -1, tables.unknown[cells])
-        self._used = np.flatnonzero(unknown >= 0)
-        self._onto, self._share = unknown[self._used], tables.weight[cells[self._used]]
-        self._absolute_share = np.abs(self._share)
+    # -- sums -----------------------------------------------------------------------------------
 
     def _matrix(self, values: list[Array], ties: float = 1.0) -> Array:
         """Entries of the matrix from those that the terms give, in the order of their tables.
 
         After them come the ties between displacements and loop closures, and the whole diagonal.
         """
+        layout = self.layout
         given = np.concatenate([*(part.ravel() for part in values), [ties, 0.0]])
         # Without any unknown the sum is of whole numbers.
-        found = np.bincount(self._to_entry, weights=given[self._entry] * self._weight, minlength=len(self.row))
+        found = np.bincount(layout.to_entry, weights=given[layout.entry] * layout.weight, minlength=len(self.row))
         return found.astype(float, copy=False)
 
     def _gathered(self, parts: list[Array]) -> Array:
         """What the terms give on their sides, added up on the unknowns."""
-        given = np.concatenate([part.ravel() for part in parts])[self._used]
-        return self._added(given * self._share)
+        given = np.concatenate([part.ravel() for part in parts])[self.layout.used]
+        return self._added(given * self.layout.share)
 
     def _added(self, given: Array) -> Array:
         """Numbers on the used sides added up on the unknowns; without any the sum is of whole numbers."""
-        return np.bincount(self._onto, weights=given, minlength=self.total).astype(float, copy=False)
+        return np.bincount(self.layout.onto, weights=given, minlength=self.total).astype(float, copy=False)
 
     # -- evaluation -----------------------------------------------------------------------------
 
@@ -364,6 +349,9 @@ class Equations:
 
     def _evaluated(self, state: State, loading: Loading) -> _Results:
         """Results of the terms of all groups at a state; to be read before they are evaluated again."""
+        if self._core is not None:
+            parts = self._core.evaluate(_arrays(state), self.given(loading))
+            return _Results(parts, self._core.places, self._core.pull)
         places = self.retained_places(state, loading)
         pull = loading.pull - self._hanging_pulls(loading)[self._owner][:, None, :]
         constant = self._closing_pulls(state.lam)[self._owner]
@@ -379,6 +367,8 @@ class Equations:
         With ``convex`` the stiffness matrices of terms without constraint rows are replaced by positive semidefinite
         ones.
         """
+        if self._core is not None:
+            return self._at_by_core(state, loading, convex=convex)
         positions, rotation_unknowns = self.model.positions, self.rotation_unknowns
         results = self._evaluated(state, loading)
         found, force, nodal = results.groups, loading.force.ravel(), results.places.ravel()
@@ -403,26 +393,88 @@ class Equations:
             for group, part in zip(self._terms[1:], found[1:], strict=True):
                 # Several terms may share a row.
                 np.add.at(residual, self.unknowns + group.rows, part[2].ravel())
-        if len(self._retained):
+        retained = self.layout.retained
+        if len(retained):
             # A component along which nothing acts is judged by what acts across it.
-            scale[self._retained] = scale[self._retained].max(axis=1, keepdims=True)
-        for unknown, rows in self._sliding:
+            scale[retained] = scale[retained].max(axis=1, keepdims=True)
+        for unknown, rows in self.layout.sliding:
             # What slides is judged by the whole force on it: across a member rounding leaves of it what tangents have.
             np.maximum.at(scale, unknown, np.linalg.norm(state.lam[rows], axis=1))
-        values = [group.entries(part, convex=convex) for group, part in zip(self._terms, found, strict=True)]
         rotation_jacobian = found[0][5].reshape(*self.tables.sides[0].shape, self.model.element.axes).copy()
-        return Point(potential, stored, residual, scale, self._matrix(values), rotation_jacobian)
+        return Point(potential, stored, residual, scale, self._of_parts(found, convex=convex), rotation_jacobian)
 
-    @functools.cached_property
-    def _sliding(self) -> list[tuple[Index, Index]]:
-        """Numbers of unknowns (n,) that say how far something has slid along a member, and of their rows (n, axes)."""
-        found = list[tuple[Index, Index]]()
-        for terms in self._terms[1:]:
-            if terms.kind.pulls and len(terms.group.data):
-                place = terms.group.places[:, -1]
-                unknown = np.where(place < 0, -1, self.place_number[place, 0])
-                found.append((unknown[unknown >= 0], terms.group.labels[unknown >= 0] + len(self.model.positions.rows)))
-        return found
+    def _of_parts(self, parts: list[list[Array]], *, convex: bool) -> Array:
+        """Entries of the matrix from the results of all terms."""
+        pairs = zip(self._terms, parts, strict=True)
+        return self._matrix([group.entries(part, convex=convex) for group, part in pairs])
+
+    def _at_by_core(self, state: State, loading: Loading, *, convex: bool) -> Point:
+        assert self._core is not None
+        return self._point_of(self._core.at(_arrays(state), self.given(loading)), convex=convex)
+
+    def _point_of(self, found: CorePoint, *, convex: bool = False) -> Point:
+        """What the core has evaluated last."""
+        assert self._core is not None
+        parts = self._core.parts
+        entries = self._of_parts(parts, convex=True) if convex else found.entries
+        jacobian = parts[0][5].reshape(*self.tables.sides[0].shape, self.model.element.axes).copy()
+        return Point(found.potential, found.stored, found.residual, found.scale, entries, jacobian)
+
+    def corrected(
+        self,
+        state: State,
+        given: Array,
+        limits: Limits,
+        *,
+        tangent: Array | None = None,
+        border: Border | None = None,
+    ) -> tuple[State, Point, Report] | None:
+        """Newton's method by the core: the last state, the equations there, and how it ended.
+
+        None where there is no core for these equations.
+
+        Parameters
+        ----------
+        state : State
+            With prescribed rotations at their values.
+        given : ndarray
+            Loads and motions, of :meth:`given`.
+        limits : Limits
+            What controls the method, as the core takes it.
+        tangent : ndarray (entries,), optional
+            Entries of the Newton matrix for the first step.
+        border : Border, optional
+            The factor as a further unknown; it is changed there.
+        """
+        system = self.solver.of_core
+        if system is None or self._core is None:
+            return None
+        there, point, report = self._core.correct(system, _arrays(state), given, tangent, border, limits)
+        return State(*there), self._point_of(point), report
+
+    @property
+    def by_core(self) -> bool:
+        """Whether the core evaluates these equations."""
+        return self._core is not None
+
+    def given(self, loading: Loading) -> Array:
+        """Loads and motions in a row, as the core takes them and linear in them: see ``sf_model``."""
+        # One loading comes many times, and two of them in turns.
+        for known, given in self._given:
+            if known is loading:
+                return given
+        positions, beside = self.model.positions, np.zeros(self.total)
+        force = loading.force.ravel()
+        if loading.further.any():
+            beside -= self._of_moments(loading.further)
+        if loading.torque.any():
+            beside -= self._of_torque(loading.torque)
+        beside[self.rotation_unknowns : self.unknowns] -= positions.Y.T @ force
+        pull = loading.pull - self._hanging_pulls(loading)[self._owner][:, None, :]
+        parts = [pull, *loading.loads, positions.B @ loading.shift, positions.BZ @ loading.shift, beside]
+        given = np.concatenate([part.ravel() for part in (*parts, force)])
+        self._given = [(loading, given), *self._given[:1]]
+        return given
 
     def _of_moments(self, moments: Array) -> Array:
         """Moments about the fixed axes (rotations, 3) on the unknowns."""
@@ -444,10 +496,12 @@ class Equations:
         sizes = np.abs(np.concatenate([part.ravel() for part in gradients]))
         carried = np.einsum("epa,ep->e", np.abs(pull), self.model.beams.weight)
         sizes[: gradients[0].size].reshape(gradients[0].shape)[...] += carried[:, None]
-        return self._added(sizes[self._used] * self._absolute_share)
+        return self._added(sizes[self.layout.used] * self.layout.absolute_share)
 
     def slope(self, state: State, point: Point, rate: Loading) -> Array:
         """Derivative of the residual, (unknowns + rows,), along a rate of nodal loads and prescribed displacements."""
+        if self._core is not None:
+            return self._core.slope(_arrays(state), self.given(rate))
         positions = self.model.positions
         hanging = -self._hanging_pulls(rate)[self._owner]
         parts = [np.einsum("eca,ea->ec", point.rotation_jacobian, hanging)]
@@ -593,6 +647,8 @@ class Equations:
 
     def moved(self, state: State, step: Array) -> State:
         """The state after an increment (unknowns + rows,) of all unknowns and multipliers."""
+        if self._core is not None:
+            return State(*self._core.moved(_arrays(state), step))
         turn = self.spins(step)
         if self.model.space:
             q = quaternion.multiply(quaternion.from_rotation_vector(turn), state.q)
@@ -602,6 +658,10 @@ class Equations:
         y = state.y + step[self.rotation_unknowns : self.unknowns]
         unwrapped = self.model.unwrapping.moved(state.q, state.unwrapped, turn, q)
         return State(q, y, state.lam + step[self.unknowns :], unwrapped)
+
+
+def _arrays(state: State) -> tuple[Array, Array, Array, Array]:
+    return state.q, state.y, state.lam, state.unwrapped
 
 
 def turned_tangents(model: Model, state: State) -> Array:
@@ -672,17 +732,20 @@ class _Results:
 class _Terms:
     """The terms of one group, evaluated all at once."""
 
-    def __init__(self, tables: Tables, number: int, kernels: Kernels, evaluations: float) -> None:
-        model = tables.model
-        group = model.terms[number]
-        self.group, self.kind, self.sides = group, group.kind, tables.sides[number]
-        self._unknown = np.where(self.sides < 0, -1, tables.unknown[self.sides])
+    def __init__(self, layout: Layout, model: Model, number: int, kernels: Kernels, evaluations: float) -> None:
+        self.group, tables = model.terms[number], layout.tables
+        self.kind, self.sides, self._unknown = self.group.kind, tables.sides[number], layout.unknown[number]
         self._closed = tables.closed if number == 0 else None
-        labels, n = tables.labels[number] - tables.of_rows, len(group.data)
         # Elements have their multipliers from those of the loop closures.
-        self.rows = labels.ravel()
-        function = chosen(rotation_gradient(group.kind), evaluations * n, kernels)
-        self._batch = GroupBatch(model, group, function, model.unwrapping.parts[number])
+        self.rows = layout.rows[number]
+        self._of = (model, number, kernels, evaluations * len(self.group.data))
+
+    @functools.cached_property
+    def _batch(self) -> GroupBatch:
+        """The terms on CasADi's machine; the core does without."""
+        model, number, kernels, calls = self._of
+        function = chosen(rotation_gradient(self.kind), calls, kernels)
+        return GroupBatch(model, self.group, function, model.unwrapping.parts[number])
 
     def add_noise(self, noise: Array) -> None:
         """Judge the sides of what is stiff in some directions by the stiffest one."""

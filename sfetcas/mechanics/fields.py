@@ -638,7 +638,10 @@ class Fields:
         if not tendon.measured or tendon.pushes:
             return found
         slack = (name, "slack") in self.model.mesh.stops
-        return {**found, "slack": slack if tendon.stiffness is None else self.balance.elongation(name) <= 0.0}
+        if tendon.stiffness is not None:
+            slack = self.balance.elongation(name) <= 0.0
+        # That of a slack one is a multiplier that solving leaves to rounding.
+        return {**found, "slack": slack} | ({"tension": 0.0} if slack else {})
 
     def beyond(self, name: str) -> float:
         """How much longer than its free length at this load factor a tendon of given length is, m."""

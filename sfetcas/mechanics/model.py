@@ -10,7 +10,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -35,7 +34,7 @@ from .magnetism import magnets_in
 from .mass_centers import center_weights_in
 from .mesh import Mesh
 from .parts import Parts
-from .positions import Positions, entries, place_nodes
+from .positions import Assembly, Positions, place_nodes
 from .pressure import is_pressure
 from .relaxation import relaxations_in
 from .rings import rings_in
@@ -315,7 +314,7 @@ def assemble(
     scene: Scene,
     mesh: Mesh,
     *,
-    assembly: Literal["auto", "closing", "nodal"] = "auto",
+    assembly: Assembly = "auto",
     scales: Scales | None = None,
     like: Model | None = None,
 ) -> Model:
@@ -354,13 +353,8 @@ def assemble(
         rotations, positions = like.rotations, like.positions
     else:
         rotations = number_rotations(scene, mesh, element)
-        names = ("closing", "nodal") if assembly == "auto" else (assembly,)
         bodies = {name: ends[0] for name, ends in rotations.ends.items() if scene.members[name].type == "rigid"}
-        both = {name: place_nodes(scene, segments, element.axes, name == "closing", bodies) for name in names}
-        if assembly == "auto":
-            closing, nodal = (entries(both[name], segments, mesh) for name in ("closing", "nodal"))
-            assembly = "closing" if closing <= nodal else "nodal"
-        positions = both[assembly]
+        positions, assembly = place_nodes(scene, segments, element.axes, bodies, mesh, assembly)
     parts = Parts(scene, mesh, element, scales, beams, segments, rotations)
     connections = grouped(one for source in SOURCES for one in source(parts))
     groups = unit_loadings(parts, connections)

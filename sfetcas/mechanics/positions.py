@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -28,7 +29,11 @@ from ..mathematics.linear import SparseMap
 from .mesh import Mesh
 from .segments import Segments
 
-__all__ = ["Positions", "entries", "place_nodes"]
+__all__ = ["Assembly", "Positions", "place_nodes"]
+
+
+Assembly = Literal["auto", "closing", "nodal"]
+"""Which displacements are unknowns, see :func:`~sfetcas.mechanics.model.assemble`."""
 
 
 @dataclass(frozen=True)
@@ -238,13 +243,25 @@ class _Placing:
         return SparseMap(np.concatenate(row), np.concatenate(column), np.concatenate(value), shape)
 
 
-def place_nodes(scene: Scene, segments: Segments, axes: int, closing: bool, bodies: Mapping[str, int]) -> Positions:
-    """The maps of a scene in ``axes`` dimensions, by the closing or the nodal assembly.
+def place_nodes(
+    scene: Scene, segments: Segments, axes: int, bodies: Mapping[str, int], mesh: Mesh, assembly: Assembly
+) -> tuple[Positions, Assembly]:
+    """The maps of a scene in ``axes`` dimensions, and the assembly that they are of.
 
-    ``bodies`` has the number of the rotation of each rigid member.  A loop within one rigid body has no closing
-    equation: the force around it is indeterminate, and the last member is taken to carry none.
+    That is ``closing`` or ``nodal``, or for ``auto`` the one whose Newton matrix has fewer entries.  ``bodies`` has the
+    number of the rotation of each rigid member.  A loop within one rigid body has no closing equation: the force around
+    it is indeterminate, and the last member is taken to carry none.
     """
-    placing = _Placing(scene, segments, axes, closing, bodies)
+    names: tuple[Assembly, ...] = ("closing", "nodal") if assembly == "auto" else (assembly,)
+    both = {name: _Placing(scene, segments, axes, name == "closing", bodies) for name in names}
+    if assembly == "auto":
+        closing, nodal = (_entries(both[name], mesh) for name in ("closing", "nodal"))
+        assembly = "closing" if closing <= nodal else "nodal"
+    return _positions(both[assembly]), assembly
+
+
+def _positions(placing: _Placing) -> Positions:
+    segments, axes = placing.segments, placing.axes
     sizes = {"E": len(segments.parts) * axes, "Y": len(placing.labels), "B": len(segments.places) * axes}
     in_order = [placing.places[n] for n in segments.places]
     closings = [place for _, place in placing.rows]
@@ -264,9 +281,9 @@ def place_nodes(scene: Scene, segments: Segments, axes: int, closing: bool, bodi
     )
 
 
-def entries(positions: Positions, segments: Segments, mesh: Mesh) -> float:
+def _entries(placing: _Placing, mesh: Mesh) -> int:
     """Number of entries that closing rows and displacement unknowns add to the Newton matrix, for ``auto``."""
-    counts = np.array([part.elements.stop - part.elements.start for part in segments.parts])
-    axes = positions.Z.shape[1] // max(len(counts), 1)
-    touched = np.unique(positions.Z.row * len(counts) + positions.Z.column // max(axes, 1))
-    return float(counts[touched % len(counts)].sum() * mesh.order + 4 * positions.Y.shape[1]) if len(counts) else 0.0
+    parts = placing.segments.parts
+    touched = ({number for kind, number in gap.terms if kind == "E"} for _, gap in placing.rows)
+    count = sum(parts[i].elements.stop - parts[i].elements.start for row in touched for i in row)
+    return count * mesh.order + 4 * len(placing.labels)

@@ -24,7 +24,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.memory import Remembering
 from .between_states import turned_between
 from .neutral import Neutral
-from .newton import Balance, Limits, correct
+from .newton import Balance, ForCore, Limits, correct
 from .one_sided import Border
 from .prepared import Prepared, Solved
 from .redundancy import loose_rows, met, redundant, with_sharing
@@ -159,6 +159,7 @@ class Curve:
             return self
         there = copy.copy(self)
         there.prepared, there.equations, there.model = prepared, prepared.equations, prepared.model
+        there.__dict__.pop("for_core", None)
         return there
 
     def following(self, there: Standing) -> Curve:
@@ -260,6 +261,13 @@ class Curve:
         """
         shifts = rate.shift.reshape(-1, self.model.element.axes)[self._seen]
         return max(float(np.abs(part).max(initial=0.0)) for part in (rate.turn, shifts, rate.driven)), rate.nodal
+
+    @functools.cached_property
+    def for_core(self) -> tuple[Array, Array] | None:
+        """What is given at factor 0 and its rate, for the core; None where loads or equations are not linear in it."""
+        if not self._linear or self._driven or self._steady[0] != 0.0 or not self._steady[1]:
+            return None
+        return self.equations.given(self.loading(0.0)), self.equations.given(self.rate(0.0))
 
     @functools.cached_property
     def _seen(self) -> Index:
@@ -492,6 +500,15 @@ class _Across:
         unit = self.across.factor / self.curve.unit**2
         change = -float(self.row @ base) / (float(self.row @ rate) + unit)
         return np.append(base + change * rate, change)
+
+    def for_core(self) -> ForCore | None:
+        """What the core needs: loads linear in the factor, in which the equations are linear, and nothing neutral."""
+        given = self.curve.for_core if self.neutral is None else None
+        if given is None:
+            return None
+        weight = self.primal_factor * self.curve.prepared.weight
+        passing = 0.0 if self.sharp else PASSING
+        return ForCore(weight, border=(*given, self.row, self.across.factor / self.curve.unit**2, passing))
 
     def suffices(self, here: Balance) -> bool:
         """Whether an intermediate point is accurate enough; its gaps must be closed too, as small ones move much."""

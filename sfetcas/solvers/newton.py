@@ -16,16 +16,19 @@ import numpy as np
 
 from .. import tolerances
 from ..mathematics.arrays import TINY, Array
+from ..mathematics.core import Border, doubles, integers
+from ..mathematics.core import Limits as CoreLimits
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
-from .redundancy import loose_rows, met, redundant, with_sharing
-from .residuals import balanced, relative_residual, rounded
+from .redundancy import changed_by, loose_rows, met, redundant, with_sharing
+from .residuals import EPSILON, LEAST_SCALE, balanced, relative_residual, rounded
 
 __all__ = [
     "TURN",
     "AtLoads",
     "Balance",
     "Converged",
+    "ForCore",
     "Iterate",
     "Limits",
     "Moving",
@@ -143,12 +146,15 @@ def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
     Multipliers of redundant rows do not change.
     """
     equations.solver.factor(equations.regularised(point.entries, tolerances.PROXIMAL * weight, tolerances.DUAL))
-    step = equations.solver.solve(-point.residual)
-    if redundant(equations, point):
-        # Only the dual regularisation above limits the multipliers of redundant rows: that part has no meaning.
-        rows, loose = slice(equations.unknowns, None), loose_rows(equations, point)
-        if loose.size:
-            step[rows] -= loose @ (loose.T @ step[rows])
+    if not redundant(equations, point):
+        return equations.solver.solve(-point.residual)
+    # Only the dual regularisation above limits the multipliers of redundant rows: that part has no meaning.
+    rows, loose, right = slice(equations.unknowns, None), loose_rows(equations, point), -point.residual
+    # Gaps that nothing closes lead to nothing else: the rounding of what they would lead to is large.
+    idle = loose[:, np.linalg.norm(changed_by(equations, point, loose), axis=0) <= tolerances.RANK]
+    right[rows] -= idle @ (idle.T @ right[rows])
+    step = equations.solver.solve(right)
+    step[rows] -= loose @ (loose.T @ step[rows])
     return step
 
 
@@ -184,6 +190,9 @@ class System(Protocol):
     @property
     def complete(self) -> bool:
         """Whether :meth:`seen` adds no force, so that a solution is an equilibrium."""
+
+    def for_core(self) -> ForCore | None:
+        """What the core needs to solve it; None of a system that the core does not know."""
 
 
 @dataclass(frozen=True)
@@ -251,6 +260,12 @@ class AtLoads:
     def complete(self) -> bool:
         """Whether there is no drag."""
         return self.drag is None
+
+    def for_core(self) -> ForCore | None:
+        """What the core needs: it knows no drag and no neutral modes."""
+        if self.drag is not None or self.flat is not None:
+            return None
+        return ForCore(self.weight, self.equations.given(self.loads), self.tangent)
 
 
 @dataclass(frozen=True)
@@ -330,7 +345,90 @@ def correct(system: System, state: State, *, factor: float = 1.0, limits: Limits
         First value of the factor; constant unless the system has an unknown one.
     limits : Limits, optional
     """
-    return _Correction(system, limits or Limits())(state, factor)
+    limits = limits or Limits()
+    found = _by_core(system, state, factor, limits) if system.equations.by_core else None
+    return found or _Correction(system, limits)(state, factor)
+
+
+class ForCore(NamedTuple):
+    """What the core needs of a :class:`System`.
+
+    Attributes
+    ----------
+    weight : ndarray (rotation unknowns,)
+        That of the proximal term.
+    given : ndarray, optional
+        Loads and motions, of :meth:`.Equations.given`; None where there is a border.
+    tangent : ndarray (entries,), optional
+        Entries of the matrix for the first step.
+    border : (ndarray, ndarray, ndarray, float, float), optional
+        What is given at factor 0, its rate, the weighted direction (total,), its part along the factor, and the
+        residual that suffices.
+    """
+
+    weight: Array
+    given: Array | None = None
+    tangent: Array | None = None
+    border: tuple[Array, Array, Array, float, float] | None = None
+
+
+def _by_core(system: System, state: State, factor: float, limits: Limits) -> Converged | None:
+    """As :class:`_Correction` by the core, which takes the same decisions; None of what it does not know."""
+    equations, known = system.equations, system.for_core()
+    if known is None:
+        return None
+    loading = system.loading(factor)
+    begin = system.with_prescribed(state, loading)
+    if equations.rows and equations.redundant is None:
+        redundant(equations, equations.at(begin, loading))
+    if equations.rows and equations.redundant:
+        return None
+    slides, weight = integers(equations.slid_places), doubles(known.weight)
+    border = None
+    if known.border is not None:
+        begun, rate, row, unit, passing = known.border
+        row = doubles(row)
+        border = Border(begun.ctypes.data, rate.ctypes.data, row.ctypes.data, unit, passing, factor)
+    controls = CoreLimits(
+        iterations=limits.iterations,
+        returns=limits.returns,
+        slides=len(slides),
+        slide=slides.ctypes.data,
+        most=limits.most,
+        slid=limits.slides,
+        contraction=limits.contraction,
+        brief=limits.short,
+        turned=limits.turned,
+        near=limits.near,
+        converged=tolerances.CONVERGED,
+        exact=tolerances.EXACT,
+        balanced=tolerances.BALANCED,
+        least=LEAST_SCALE,
+        epsilon=EPSILON,
+        placed=PLACED,
+        proximal=tolerances.PROXIMAL,
+        dual=tolerances.DUAL,
+        weight=weight.ctypes.data,
+    )
+    given = weight if known.given is None else known.given
+    found = equations.corrected(begin, given, controls, tangent=known.tangent, border=border)
+    if found is None:
+        return None
+    there, point, report = found
+    residual, good = report.residual, bool(report.good)
+    if border is not None:
+        loading = system.loading(border.factor)
+    if good:
+        there, point = with_sharing(equations, there, loading, point, max(report.tolerance, residual))
+        residual = relative_residual(equations, point)
+    lengths = [report.first, report.second][: report.steps]
+    return Converged(there, loading, point, residual, good, report.iterations, *_first_two(lengths, good))
+
+
+def _first_two(lengths: list[float], good: bool) -> tuple[float, float]:
+    """The lengths of the first two steps, rad: where nothing acts there is none; where none was possible it is inf."""
+    first, second, *_ = [*lengths, 0.0 if lengths or good else np.inf, 0.0]
+    return first, second
 
 
 class _Correction:
@@ -407,9 +505,7 @@ class _Correction:
         if good and complete:
             found, point = with_sharing(self.equations, found, here.loading, point, max(tolerance, residual))
             residual = relative_residual(self.equations, point)
-        # Where nothing acts no step is taken; where none could be taken nothing is known.
-        first, second, *_ = [*self.lengths, 0.0 if self.lengths or good else np.inf, 0.0]
-        return Converged(found, here.loading, point, residual, good, count, first, second)
+        return Converged(found, here.loading, point, residual, good, count, *_first_two(self.lengths, good))
 
 
 # -- downhill ------------------------------------------------------------------------------------------------

@@ -179,6 +179,10 @@ class OneSided(AtLoads):
         factor = -(self.border.row @ moved) / (float(self.border.row @ rate) + self.border.share)
         return moved + np.outer(rate, factor), factor
 
+    def for_core(self) -> None:
+        """None: the core does not know what pushes."""
+        return
+
     def suffices(self, here: Balance) -> bool:
         """Whether choices come again and again that differ by rounding."""
         close = [chosen for chosen, _ in self._past if chosen]

@@ -20,7 +20,8 @@ from ..mathematics.arrays import Array, numbers
 from ..mathematics.constants import sparse, times
 from ..mathematics.linear import pattern
 from ..mechanics.beams import ELEMENT_DATA
-from ..mechanics.equations import UNLOADED, State
+from ..mechanics.equations import State
+from ..mechanics.evaluation import UNLOADED
 from ..mechanics.expressions import LOADS, Expressions, Given, moved_by
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model

@@ -7,7 +7,7 @@ import numpy as np
 from .. import tolerances
 from ..mechanics.equations import Equations, Point, State
 
-__all__ = ["LEAST_SCALE", "balanced", "relative_residual", "rounded"]
+__all__ = ["EPSILON", "LEAST_SCALE", "balanced", "relative_residual", "rounded"]
 
 
 def relative_residual(equations: Equations, point: Point) -> float:

@@ -1,0 +1,26 @@
+/* All of the core as one unit. */
+
+#include "tape.c"
+#include "equations.c"
+#include "states.c"
+#include "factors.c"
+#include "newton.c"
+
+int sf_version(void) { return SF_VERSION; }
+
+/* Sizes of what is handed over, by which a program finds that it was made for another core. */
+int sf_sizes(int *sizes) {
+  sizes[0] = (int)sizeof(sf_operation);
+  sizes[1] = (int)sizeof(sf_tape);
+  sizes[2] = (int)sizeof(sf_group);
+  sizes[3] = (int)sizeof(sf_model);
+  sizes[4] = (int)sizeof(sf_point);
+  sizes[5] = (int)sizeof(sf_factors);
+  sizes[6] = (int)sizeof(sf_pivoted);
+  sizes[7] = (int)sizeof(sf_system);
+  sizes[8] = (int)sizeof(sf_limits);
+  sizes[9] = (int)sizeof(sf_border);
+  sizes[10] = (int)sizeof(sf_report);
+  sizes[11] = SF_OPERATIONS;
+  return 0;
+}

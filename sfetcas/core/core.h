@@ -1,0 +1,204 @@
+/* The core of sfetcas: a model given as tables is evaluated, assembled, factorised and solved.
+ *
+ * C99 with the math library alone.  Nothing is made for a scene: kinds of terms come as tapes, lists of operations, and
+ * a model as index tables and numbers.  All sums are taken in the order of the tables, and no operations are fused, so
+ * that the same tables give the same bits on any machine with IEEE arithmetic.
+ *
+ * Functions return 0 where they did what they say, else another number that each explains.  They keep nothing between
+ * calls but what is in the structures, and change only what is not const in them.
+ */
+
+#ifndef SFETCAS_CORE_H
+#define SFETCAS_CORE_H
+
+#define SF_VERSION 1
+
+#ifdef _WIN32
+#define SF_PUBLIC __declspec(dllexport)
+#else
+#define SF_PUBLIC
+#endif
+
+/* ---- tapes ------------------------------------------------------------------------------------ */
+
+/* An operation on numbers in slots; SF_IN, SF_OUT and SF_CONSTANT have the other number in a. */
+typedef struct {
+  int operation, to, a, b;
+} sf_operation;
+
+/* A function of one term: from its arguments, one after the other, to its results, one after the other. */
+typedef struct {
+  int operations, slots, arguments, results, constants;
+  const sf_operation *code;
+  const double *constant;
+} sf_tape;
+
+/* ---- sparse matrices ---------------------------------------------------------------------------- */
+
+/* A constant matrix by its rows. */
+typedef struct {
+  int rows, columns;
+  const int *start, *column;
+  const double *value;
+} sf_map;
+
+/* Sums over places in a row of numbers, each with a weight: what the i-th number is made of. */
+typedef struct {
+  int count;
+  const int *start, *from;
+  const double *weight;
+} sf_sums;
+
+/* ---- models ------------------------------------------------------------------------------------- */
+
+/* All terms of one kind. */
+typedef struct {
+  const sf_tape *tape;
+  int terms, turns, places, data, loads, rows;
+  const int *turn;      /* (terms, turns) rotations, -1: the ground */
+  const int *place;     /* (terms, places) places, -1: the ground */
+  const double *datum;  /* (terms, data) */
+  int angle;            /* first of the angles that stand last in the data, -1: none */
+  const int *row;       /* (terms, rows) multipliers; of elements those of a list beside, by element */
+  int load, result;     /* where loads and results begin */
+  int rests;            /* results before the rows: energy and stored energy */
+  int gradient, jacobian; /* where these begin among the results of a term */
+  int proportional;     /* whether its forces are proportional to its loads, whatever the displacements */
+} sf_group;
+
+/* A model: the equations of statics, see sfetcas/mechanics/equations.py, where the same is written in NumPy. */
+typedef struct {
+  int space, components, turning, axes; /* components of a rotation, of a rotation vector, of a place */
+  int rotations, places, displacements, rows, closings, angles;
+  int unknowns, rotation_unknowns, total;
+  int elements, points, segments;
+  int groups;
+  const sf_group *group; /* the first are the elements */
+  const int *owner;      /* (elements,) segment of each element */
+  const double *weight;  /* (elements, points) */
+  sf_map Y, Z, ZT, W, WT, WTa, YTa; /* WTa, YTa: magnitudes of transposes */
+  /* Where what is given begins: pulls, loads of the other groups, shifts of places and of closings, what is beside the
+   * terms in the residual, forces.  All of it is linear in loads and motions. */
+  int given, pull, shift, opening, beside, force;
+  int results; /* numbers that all terms give together, and one more: 1 */
+  sf_sums entries, sides, sizes;
+  const int *side_of;    /* (sides of the sums,) the element of a size, -1 */
+  const double *noise;   /* (total,) */
+  int retained;          /* groups of axes components that are judged together */
+  const int *retain;     /* (retained, axes) unknowns */
+  int sliding;
+  const int *slide;      /* (sliding, 1 + axes) unknown, and multipliers of its force */
+  double unloaded;
+  /* States. */
+  const int *unknown;       /* (rotations, turning) unknown of each component of a rotation vector, -1 */
+  const double *share;      /* (rotations, turning) its weight */
+  const double *counted;    /* (angles, 8): axis, across, share, 0 */
+  const int *counting;      /* (angles, 3): sides, whether across is not zero */
+  /* The Newton matrix. */
+  int entry_count;
+  const int *entry_row, *entry_column, *diagonal;
+} sf_model;
+
+/* Numbers that a state has: rotations, displacements, multipliers, angles that are counted. */
+typedef struct {
+  double *q, *y, *lam, *unwrapped;
+} sf_state;
+
+/* What the equations are at a state. */
+typedef struct {
+  double potential, stored;
+  double *residual, *scale; /* (total,) */
+  double *entries;          /* (entry_count,) */
+  double *result;           /* (results,) of all terms */
+  double *place;            /* (places, axes) displacements that terms saw */
+  double *pull;             /* (elements, points, axes) whole pull */
+  double *work;             /* sf_work_size(model) numbers */
+} sf_point;
+
+SF_PUBLIC int sf_version(void);
+SF_PUBLIC int sf_sizes(int *sizes);
+SF_PUBLIC int sf_run(const sf_tape *tape, int count, const double *arguments, double *results, double *work);
+SF_PUBLIC int sf_tape_work(const sf_tape *tape);
+SF_PUBLIC int sf_work_size(const sf_model *model);
+SF_PUBLIC int sf_evaluate(const sf_model *model, const sf_state *state, const double *given, sf_point *point);
+SF_PUBLIC int sf_at(const sf_model *model, const sf_state *state, const double *given, sf_point *point);
+SF_PUBLIC int sf_slope(const sf_model *model, const sf_state *state, const double *rate, const sf_point *point,
+                       double *slope, double *results);
+SF_PUBLIC int sf_move(const sf_model *model, const sf_state *from, const double *step, double share, sf_state *to);
+
+/* ---- linear systems ------------------------------------------------------------------------------- */
+
+/* Factors L D L^T of symmetric matrices of one pattern without pivoting, and what solving takes; see factors.c. */
+typedef struct {
+  int n, entries;
+  const int *start, *row;    /* the whole matrix, column by column, n + 1 and entries */
+  const int *order, *place;  /* (n,) the unknown that is eliminated at each place; its inverse */
+  int filled;
+  int *parent, *lower, *lower_row; /* (n,) tree; (n + 1,) and (filled,) L by columns */
+  double *value, *pivot;           /* (filled,) and (n,) */
+  int *mark, *path, *used;         /* (n,) each */
+  double *column;                  /* (n,) */
+} sf_factors;
+
+/* Factors of any matrix of the pattern with pivoting, see pivoted.h; room: entries that L and U may have, each. */
+typedef struct {
+  int n;
+  const int *start, *row, *order;
+  int room;
+  int *place, *row_of, *mark, *reached, *stack, *at; /* (n,) each */
+  int *lower, *upper;                                /* (n + 1,) each */
+  int *lower_row, *upper_row;                        /* (room,) each */
+  double *lower_value, *upper_value;                 /* (room,) each */
+  double *pivot, *x;                                 /* (n,) each */
+} sf_pivoted;
+
+/* Matrices of one pattern, and how they are solved. */
+typedef struct {
+  sf_factors *factors;
+  sf_pivoted *pivoted;
+  const double *soft; /* (n,) added to the diagonal where there is no pivoting */
+  int symmetric, lost, often;
+  double solved;
+} sf_system;
+
+SF_PUBLIC int sf_count(sf_factors *factors);
+SF_PUBLIC int sf_factorise(sf_factors *factors, const double *entries, int *negative);
+SF_PUBLIC int sf_backward(const sf_factors *factors, int columns, double *x, double *work);
+SF_PUBLIC int sf_solve(sf_system *system, const double *entries, int columns, const double *b, double *x,
+                       double *work);
+
+/* ---- Newton's method ------------------------------------------------------------------------------- */
+
+/* What controls a correction: the limits, tolerances and weights of sfetcas/solvers/newton.py. */
+typedef struct {
+  int iterations, returns;
+  int slides;                                  /* unknowns that say where on a member something slides */
+  const int *slide;                            /* (slides,) */
+  double most, slid, contraction, brief, turned, near; /* slid: by how much in a step; brief: short in Python */
+  double converged, exact, balanced, least, epsilon, placed;
+  double proximal, dual;
+  const double *weight;                        /* (rotation_unknowns,) of the proximal term */
+} sf_limits;
+
+/* The factor of loads and motions as a further unknown, and the equation that keeps steps orthogonal to a direction. */
+typedef struct {
+  const double *begun, *rate; /* (given,) at factor 0, and by the factor */
+  const double *row;          /* (total,) weighted direction */
+  double unit;                /* its part along the factor */
+  double passing;             /* relative residual that suffices where gaps are closed; 0: none */
+  double factor;              /* changed */
+} sf_border;
+
+/* How a correction ended. */
+typedef struct {
+  int good, iterations, refused, steps;        /* steps: of how many the length is told */
+  double residual, tolerance, first, second;   /* lengths of the first two steps, rad */
+} sf_report;
+
+SF_PUBLIC double sf_relative(const sf_model *model, const sf_point *point, double least);
+SF_PUBLIC int sf_correct_size(const sf_model *model);
+SF_PUBLIC int sf_correct(const sf_model *model, sf_system *system, const double *given, const double *tangent,
+                         sf_border *border, const sf_limits *limits, sf_state *state, sf_point *point, double *memory,
+                         sf_report *report);
+
+#endif

@@ -1,0 +1,107 @@
+/* Sparse systems of any kind: factors P A Q = L U with partial pivoting, column by column.
+ *
+ * The pattern of a column of the factors is what its entries reach in the columns before (Gilbert and Peierls 1988;
+ * Davis 2006, chapter 6).  Of pivots the one on the diagonal is taken where it is not small beside the others, which
+ * keeps the factors sparse.  Included by factors.c.
+ */
+
+#define SF_SMALL 0.1 /* share of the largest in a column that a pivot on the diagonal must have */
+
+/* Places that the entries of a column reach, in topological order from top on. */
+static int sf_reach(sf_pivoted *f, int column, int mark) {
+  int top = f->n, p, *stack = f->stack, *at = f->at;
+  for (p = f->start[column]; p < f->start[column + 1]; ++p) {
+    int head = 0;
+    if (f->mark[f->row[p]] == mark) continue;
+    stack[0] = f->row[p];
+    while (head >= 0) {
+      int i = stack[head], k = f->place[i], next, end, found = 0;
+      if (f->mark[i] != mark) {
+        f->mark[i] = mark;
+        at[head] = k < 0 ? 0 : f->lower[k];
+      }
+      end = k < 0 ? 0 : f->lower[k + 1];
+      for (next = at[head]; next < end; ++next) {
+        int j = f->lower_row[next];
+        if (f->mark[j] == mark) continue;
+        at[head] = next + 1;
+        stack[++head] = j;
+        found = 1;
+        break;
+      }
+      if (!found) {
+        --head;
+        f->reached[--top] = i;
+      }
+    }
+  }
+  return top;
+}
+
+/* Factors of a matrix; 1 where it is singular, 2 where they have no room. */
+static int sf_pivot(sf_pivoted *f, const double *entries) {
+  int n = f->n, k, i, p, lower = 0, upper = 0;
+  for (i = 0; i < n; ++i) {
+    f->place[i] = -1;
+    f->mark[i] = -1;
+    f->x[i] = 0.0;
+  }
+  for (k = 0; k < n; ++k) {
+    int column = f->order[k], top, chosen = -1;
+    double most = -1.0;
+    f->lower[k] = lower;
+    f->upper[k] = upper;
+    if (lower + n > f->room || upper + n > f->room) return 2;
+    top = sf_reach(f, column, k);
+    for (p = f->start[column]; p < f->start[column + 1]; ++p) f->x[f->row[p]] += entries[p];
+    for (p = top; p < n; ++p) {
+      int j = f->reached[p], at = f->place[j], q;
+      double value;
+      if (at < 0) continue;
+      value = f->x[j];
+      for (q = f->lower[at]; q < f->lower[at + 1]; ++q) f->x[f->lower_row[q]] -= f->lower_value[q] * value;
+    }
+    for (p = top; p < n; ++p) {
+      i = f->reached[p];
+      if (f->place[i] >= 0) {
+        f->upper_row[upper] = f->place[i];
+        f->upper_value[upper++] = f->x[i];
+      } else if (fabs(f->x[i]) > most) {
+        most = fabs(f->x[i]);
+        chosen = i;
+      }
+    }
+    if (chosen < 0 || !(most > 0.0)) return 1;
+    if (f->mark[column] == k && f->place[column] < 0 && fabs(f->x[column]) >= SF_SMALL * most) chosen = column;
+    f->pivot[k] = f->x[chosen];
+    f->place[chosen] = k;
+    f->row_of[k] = chosen;
+    for (p = top; p < n; ++p) {
+      i = f->reached[p];
+      if (f->place[i] < 0) {
+        f->lower_row[lower] = i;
+        f->lower_value[lower++] = f->x[i] / f->pivot[k];
+      }
+      f->x[i] = 0.0;
+    }
+    f->lower[k + 1] = lower;
+    f->upper[k + 1] = upper;
+  }
+  return 0;
+}
+
+/* The solution in place of a right side. */
+static void sf_pivoted_backward(const sf_pivoted *f, double *x, double *work) {
+  int n = f->n, k, p;
+  /* L has the rows of the matrix. */
+  for (k = 0; k < n; ++k) {
+    double value = x[f->row_of[k]];
+    work[k] = value;
+    for (p = f->lower[k]; p < f->lower[k + 1]; ++p) x[f->lower_row[p]] -= f->lower_value[p] * value;
+  }
+  for (k = n - 1; k >= 0; --k) {
+    work[k] /= f->pivot[k];
+    for (p = f->upper[k]; p < f->upper[k + 1]; ++p) work[f->upper_row[p]] -= f->upper_value[p] * work[k];
+  }
+  for (k = 0; k < n; ++k) x[f->order[k]] = work[k];
+}

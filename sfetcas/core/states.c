@@ -1,0 +1,114 @@
+/* States: rotations by vectors about the fixed axes, displacements, and angles that count turns. */
+
+#include <math.h>
+#include <stddef.h>
+
+#include "core.h"
+#include "elementary.h"
+
+#define SF_PI 3.14159265358979323846
+
+static void sf_product(const double *a, const double *b, double *c) {
+  c[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
+  c[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
+  c[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
+  c[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
+}
+
+static double sf_dot3(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static void sf_cross(const double *a, const double *b, double *c) {
+  c[0] = a[1] * b[2] - a[2] * b[1];
+  c[1] = a[2] * b[0] - a[0] * b[2];
+  c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static void sf_rotated(const double *q, const double *v, double *r) {
+  double t[3], u[3];
+  int i;
+  sf_cross(q + 1, v, t);
+  for (i = 0; i < 3; ++i) t[i] *= 2.0;
+  sf_cross(q + 1, t, u);
+  for (i = 0; i < 3; ++i) r[i] = v[i] + q[0] * t[i] + u[i];
+}
+
+/* The unit quaternion of a rotation by a vector. */
+static void sf_turned(const double *v, double *q) {
+  double angle = sqrt(sf_dot3(v, v)), half = 0.5 * angle;
+  /* sin(x / 2) / x to rounding for small x, too. */
+  double share = angle > 1e-8 ? sf_sin(half) / angle : 0.5;
+  q[0] = sf_cos(half);
+  q[1] = share * v[0];
+  q[2] = share * v[1];
+  q[3] = share * v[2];
+}
+
+static const double *sf_side(const double *q, int number) {
+  static const double ground[4] = {1.0, 0.0, 0.0, 0.0};
+  return number < 0 ? ground : q + (size_t)4 * number;
+}
+
+/* Of all values of an angle with the same rotation the one nearest to a value. */
+static double sf_counted(const sf_model *m, int i, const double *q, double near) {
+  const double *counted = m->counted + (size_t)i * 8;
+  const int *counting = m->counting + (size_t)i * 3;
+  const double *a = sf_side(q, counting[0]), *b = sf_side(q, counting[1]);
+  double conjugate[4], relative[4], sine, cosine, share = counted[6], raw, period;
+  conjugate[0] = a[0];
+  conjugate[1] = -a[1];
+  conjugate[2] = -a[2];
+  conjugate[3] = -a[3];
+  sf_product(conjugate, b, relative);
+  if (counting[2]) {
+    double seen[3], beside[3];
+    sf_rotated(relative, counted + 3, seen);
+    sf_cross(counted, counted + 3, beside);
+    sine = sf_dot3(beside, seen);
+    cosine = sf_dot3(counted + 3, seen);
+  } else {
+    sine = sf_dot3(counted, relative + 1);
+    cosine = relative[0];
+  }
+  raw = share * sf_atan2(sine, cosine);
+  period = 2.0 * SF_PI * share;
+  return raw + period * nearbyint((near - raw) / period);
+}
+
+/* The state after a share of an increment of all unknowns and multipliers. */
+int sf_move(const sf_model *m, const sf_state *from, const double *step, double share, sf_state *to) {
+  int i, k;
+  for (i = 0; i < m->angles; ++i) {
+    /* Of the angles first how far they turn from where they are. */
+    const int *counting = m->counting + (size_t)i * 3;
+    double turn[3] = {0.0, 0.0, 0.0}, axis[3];
+    int side;
+    for (side = 0; side < 2; ++side)
+      if (counting[side] >= 0)
+        for (k = 0; k < 3; ++k) {
+          int unknown = m->unknown[counting[side] * 3 + k];
+          double by = unknown < 0 ? 0.0 : share * step[unknown] * m->share[counting[side] * 3 + k];
+          turn[k] += side ? by : -by;
+        }
+    sf_rotated(sf_side(from->q, counting[0]), m->counted + (size_t)i * 8, axis);
+    to->unwrapped[i] = sf_counted(m, i, from->q, from->unwrapped[i]) + sf_dot3(axis, turn);
+  }
+  for (i = 0; i < m->rotations; ++i) {
+    double turn[3] = {0.0, 0.0, 0.0}, by[4], q[4], size;
+    for (k = 0; k < m->turning; ++k) {
+      int unknown = m->unknown[i * m->turning + k];
+      if (unknown >= 0) turn[k] = share * step[unknown] * m->share[i * m->turning + k];
+    }
+    if (!m->space) {
+      to->q[i] = from->q[i] + turn[0];
+      continue;
+    }
+    sf_turned(turn, by);
+    sf_product(by, from->q + (size_t)4 * i, q);
+    size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (k = 0; k < 4; ++k) to->q[(size_t)4 * i + k] = q[k] / size;
+  }
+  for (i = 0; i < m->displacements; ++i) to->y[i] = from->y[i] + share * step[m->rotation_unknowns + i];
+  for (i = 0; i < m->rows; ++i) to->lam[i] = from->lam[i] + share * step[m->unknowns + i];
+  for (i = 0; i < m->angles; ++i) to->unwrapped[i] = sf_counted(m, i, to->q, to->unwrapped[i]);
+  return 0;
+}

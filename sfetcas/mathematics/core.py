@@ -1,0 +1,274 @@
+"""The core in C in this process: its library, found or compiled, and what is handed to it.
+
+A library is looked for beside the sources, where installing has put it, then in the cache of compiled kernels, where it
+is compiled at the first use if there is a compiler and ``$SFETCAS_KERNELS`` is not ``interpreted``.  One that was made
+from other sources or for another machine has another name, one that was cut short or changed another checksum, and what
+does not agree on the sizes of structures is not used.  ``$SFETCAS_CORE=off`` does without.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ..core.building import SOURCES, compile_core, prefix, whole
+from .arrays import Array
+from .kernels import cache_folder, private
+from .tapes import NAMES, Tape
+
+__all__ = [
+    "Border",
+    "Factors",
+    "Group",
+    "Limits",
+    "Map",
+    "Model",
+    "Pivoted",
+    "Point",
+    "Report",
+    "State",
+    "Sums",
+    "System",
+    "TapeTable",
+    "core",
+    "doubles",
+    "integers",
+    "table_of",
+]
+
+_int, _double, _pointer = ctypes.c_int, ctypes.c_double, ctypes.c_void_p
+
+
+class TapeTable(ctypes.Structure):
+    """``sf_tape``."""
+
+    _fields_ = (
+        *((name, _int) for name in ("operations", "slots", "arguments", "results", "constants")),
+        ("code", _pointer),
+        ("constant", _pointer),
+    )
+
+
+class Map(ctypes.Structure):
+    """``sf_map``."""
+
+    _fields_ = (("rows", _int), ("columns", _int), ("start", _pointer), ("column", _pointer), ("value", _pointer))
+
+
+class Sums(ctypes.Structure):
+    """``sf_sums``."""
+
+    _fields_ = (("count", _int), ("start", _pointer), ("from", _pointer), ("weight", _pointer))
+
+
+class Group(ctypes.Structure):
+    """``sf_group``."""
+
+    _fields_ = (
+        ("tape", _pointer),
+        *((name, _int) for name in ("terms", "turns", "places", "data", "loads", "rows")),
+        ("turn", _pointer),
+        ("place", _pointer),
+        ("datum", _pointer),
+        ("angle", _int),
+        ("row", _pointer),
+        *((name, _int) for name in ("load", "result", "rests", "gradient", "jacobian", "proportional")),
+    )
+
+
+class Model(ctypes.Structure):
+    """``sf_model``."""
+
+    _fields_ = (
+        *((name, _int) for name in ("space", "components", "turning", "axes")),
+        *((name, _int) for name in ("rotations", "places", "displacements", "rows", "closings", "angles")),
+        *((name, _int) for name in ("unknowns", "rotation_unknowns", "total")),
+        *((name, _int) for name in ("elements", "points", "segments", "groups")),
+        ("group", _pointer),
+        ("owner", _pointer),
+        ("weight", _pointer),
+        *((name, Map) for name in ("Y", "Z", "ZT", "W", "WT", "WTa", "YTa")),
+        *((name, _int) for name in ("given", "pull", "shift", "opening", "beside", "force", "results")),
+        *((name, Sums) for name in ("entries", "sides", "sizes")),
+        ("side_of", _pointer),
+        ("noise", _pointer),
+        ("retained", _int),
+        ("retain", _pointer),
+        ("sliding", _int),
+        ("slide", _pointer),
+        ("unloaded", _double),
+        ("unknown", _pointer),
+        ("share", _pointer),
+        ("counted", _pointer),
+        ("counting", _pointer),
+        ("entry_count", _int),
+        ("entry_row", _pointer),
+        ("entry_column", _pointer),
+        ("diagonal", _pointer),
+    )
+
+
+class State(ctypes.Structure):
+    """``sf_state``."""
+
+    _fields_ = (("q", _pointer), ("y", _pointer), ("lam", _pointer), ("unwrapped", _pointer))
+
+
+class Point(ctypes.Structure):
+    """``sf_point``."""
+
+    _fields_ = (
+        ("potential", _double),
+        ("stored", _double),
+        *((name, _pointer) for name in ("residual", "scale", "entries", "result", "place", "pull", "work")),
+    )
+
+
+class Factors(ctypes.Structure):
+    """``sf_factors``."""
+
+    _fields_ = (
+        ("n", _int),
+        ("entries", _int),
+        *((name, _pointer) for name in ("start", "row", "order", "place")),
+        ("filled", _int),
+        *((name, _pointer) for name in ("parent", "lower", "lower_row", "value", "pivot", "mark", "path", "used")),
+        ("column", _pointer),
+    )
+
+
+class Pivoted(ctypes.Structure):
+    """``sf_pivoted``."""
+
+    _fields_ = (
+        ("n", _int),
+        *((name, _pointer) for name in ("start", "row", "order")),
+        ("room", _int),
+        *((name, _pointer) for name in ("place", "row_of", "mark", "reached", "stack", "at", "lower", "upper")),
+        *((name, _pointer) for name in ("lower_row", "upper_row", "lower_value", "upper_value", "pivot", "x")),
+    )
+
+
+class System(ctypes.Structure):
+    """``sf_system``."""
+
+    _fields_ = (
+        *((name, _pointer) for name in ("factors", "pivoted", "soft")),
+        *((name, _int) for name in ("symmetric", "lost", "often")),
+        ("solved", _double),
+    )
+
+
+class Limits(ctypes.Structure):
+    """``sf_limits``."""
+
+    _fields_ = (
+        *((name, _int) for name in ("iterations", "returns", "slides")),
+        ("slide", _pointer),
+        *((name, _double) for name in ("most", "slid", "contraction", "brief", "turned", "near")),
+        *((name, _double) for name in ("converged", "exact", "balanced", "least", "epsilon", "placed")),
+        *((name, _double) for name in ("proximal", "dual")),
+        ("weight", _pointer),
+    )
+
+
+class Border(ctypes.Structure):
+    """``sf_border``."""
+
+    _fields_ = (
+        *((name, _pointer) for name in ("begun", "rate", "row")),
+        *((name, _double) for name in ("unit", "passing", "factor")),
+    )
+
+
+class Report(ctypes.Structure):
+    """``sf_report``."""
+
+    _fields_ = (
+        *((name, _int) for name in ("good", "iterations", "refused", "steps")),
+        *((name, _double) for name in ("residual", "tolerance", "first", "second")),
+    )
+
+
+HANDED = (TapeTable, Group, Model, Point, Factors, Pivoted, System, Limits, Border, Report)
+
+SIZES = (16, *(ctypes.sizeof(kind) for kind in HANDED), len(NAMES))
+"""What the core says of the sizes of what is handed to it, if it is the one that this module was written for."""
+
+VERSION = 1
+"""Number of the interface, as ``SF_VERSION``."""
+
+
+def integers(values: Array) -> Array:
+    """Whole numbers (n, ...) as the core takes them."""
+    return np.ascontiguousarray(values, dtype=np.intc)
+
+
+def doubles(values: Array) -> Array:
+    """Numbers (n, ...) as the core takes them."""
+    return np.ascontiguousarray(values, dtype=float)
+
+
+def table_of(tape: Tape) -> tuple[TapeTable, list[Array]]:
+    """A tape as the core takes it, and the arrays that it points to."""
+    code, constant = integers(tape.code), doubles(tape.constant)
+    sizes = (len(code), tape.slots, tape.arguments, tape.results, len(constant))
+    return TapeTable(*sizes, code.ctypes.data, constant.ctypes.data), [code, constant]
+
+
+def core() -> ctypes.CDLL | None:
+    """The core; None where there is none, or where it is switched off."""
+    if os.environ.get("SFETCAS_CORE", "") == "off":
+        return None
+    return _found(os.environ.get("SFETCAS_CACHE"), os.environ.get("SFETCAS_KERNELS") != "interpreted")
+
+
+@functools.lru_cache(maxsize=4)
+def _found(_: str | None, compiles: bool) -> ctypes.CDLL | None:
+    """The core, compiled where that is allowed; looked for anew where the cache is another one."""
+    beginning = prefix()
+    found, cache = _in(SOURCES, beginning), cache_folder()
+    if found is not None or cache is None:
+        return found
+    with contextlib.suppress(OSError):
+        cache.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if private(cache):
+            found = _in(cache, beginning)
+            if found is None and compiles and compile_core(cache) is not None:
+                found = _in(cache, beginning)
+    return found
+
+
+def _in(folder: Path, beginning: str) -> ctypes.CDLL | None:
+    """The library in a folder whose name begins so, if it is whole."""
+    with contextlib.suppress(OSError, AttributeError):
+        path = whole(folder, beginning)
+        return None if path is None else _declared(ctypes.CDLL(str(path)))
+    return None
+
+
+def _declared(library: ctypes.CDLL) -> ctypes.CDLL | None:
+    """The library with the types of its functions; None if it is not the one that this module was written for."""
+    sizes = (_int * len(SIZES))()
+    library.sf_sizes(sizes)
+    if library.sf_version() != VERSION or tuple(sizes) != SIZES:
+        return None
+    library.sf_run.argtypes = [_pointer, _int, _pointer, _pointer, _pointer]
+    library.sf_tape_work.argtypes = [_pointer]
+    library.sf_work_size.argtypes = [_pointer]
+    library.sf_evaluate.argtypes = [_pointer] * 4
+    library.sf_at.argtypes = [_pointer] * 4
+    library.sf_slope.argtypes = [_pointer] * 6
+    library.sf_move.argtypes = [_pointer, _pointer, _pointer, _double, _pointer]
+    library.sf_count.argtypes = [_pointer]
+    library.sf_factorise.argtypes = [_pointer] * 3
+    library.sf_backward.argtypes = [_pointer, _int, _pointer, _pointer]
+    library.sf_correct_size.argtypes = [_pointer]
+    library.sf_correct.argtypes = [_pointer] * 10
+    library.sf_solve.argtypes = [_pointer, _pointer, _int, _pointer, _pointer, _pointer]
+    return library

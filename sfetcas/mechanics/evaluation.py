@@ -1,0 +1,398 @@
+"""A model as tables for the core in C, which evaluates and assembles its equations.
+
+Everything here follows from :class:`~sfetcas.mechanics.layout.Layout`; :mod:`~sfetcas.mechanics.equations` has the same
+evaluation in NumPy, for where there is no core.  Results of all terms stand in a row of numbers, group by group and
+term by term; weighted sums take them to residuals and to the entries of the matrix.
+"""
+
+from __future__ import annotations
+
+import copy
+import ctypes
+import functools
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..mathematics import core as c
+from ..mathematics.arrays import Array
+from ..mathematics.linear import NO_ROOM, CoreSystem, SparseMap
+from ..mathematics.tapes import tape_of
+from .layout import Layout
+from .model import Model
+from .terms import rotation_gradient
+
+__all__ = ["UNLOADED", "CoreModel", "CorePoint", "Parts", "core_model"]
+
+UNLOADED = 1e-6
+"""Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
+
+Parts = list[list[Array]]
+"""For each group its results, as of :func:`~sfetcas.mechanics.terms.rotation_gradient`, each (n, ...)."""
+
+
+def core_model(layout: Layout, model: Model, noise: Array) -> CoreModel | None:
+    """The model for the core; None where there is no core, or a kind of term has operations that it does not know.
+
+    ``noise`` (total,) is what rounding leaves of each residual; it may be set later on.
+    """
+    library = c.core()
+    if library is None:
+        return None
+    if layout.of_core is None:
+        layout.of_core = _CoreLayout(layout, model)
+    found = layout.of_core
+    return CoreModel(library, found, model, noise) if isinstance(found, _CoreLayout) and found.known else None
+
+
+class CorePoint:
+    """What the core says of a state: arrays that are made anew for each, see ``sf_point``.
+
+    Attributes
+    ----------
+    potential, stored : float
+    residual, scale : ndarray (total,)
+    entries : ndarray (entries,)
+    """
+
+    def __init__(self, model: CoreModel) -> None:
+        self.residual, self.scale = np.empty(model.total), np.empty(model.total)
+        self.entries = np.empty(model.entry_count)
+        self._point = c.Point(
+            0.0,
+            0.0,
+            self.residual.ctypes.data,
+            self.scale.ctypes.data,
+            self.entries.ctypes.data,
+            *model.shared,
+        )
+
+    @property
+    def potential(self) -> float:
+        """Potential energy, dimensionless."""
+        return float(self._point.potential)
+
+    @property
+    def stored(self) -> float:
+        """Strain energy, dimensionless."""
+        return float(self._point.stored)
+
+    @property
+    def address(self) -> Any:
+        """What the core is given."""
+        return ctypes.addressof(self._point)
+
+
+class _CoreLayout:
+    """What the core takes that follows from the structure of a model alone, see :class:`~.layout.Layout`.
+
+    Attributes
+    ----------
+    known : bool
+        Whether all kinds of terms have tapes.
+    model : Model
+        The structure for the core, without the numbers of a model.
+    groups : array of Group
+        The groups for the core, without their data.
+    tapes : list of Tape
+    begins : ndarray (groups + 1,)
+        Where the results of each group begin.
+    """
+
+    def __init__(self, layout: Layout, model: Model) -> None:
+        self._layout, self._tables = layout, layout.tables
+        tapes = [tape_of(rotation_gradient(group.kind)) for group in model.terms]
+        self.tapes = [tape for tape in tapes if tape is not None]
+        self.known = len(self.tapes) == len(tapes)
+        self._alive: list[Any] = []
+        if self.known:
+            self._terms = [len(group.data) for group in model.terms]
+            sizes = (n * tape.results for n, tape in zip(self._terms, self.tapes, strict=True))
+            self.begins = np.cumsum([0, *sizes])
+            self._make(model)
+
+    def _make(self, model: Model) -> None:
+        layout, tables, maps, element = self._layout, self._tables, model.positions, model.element
+        places, along = len(model.segments.places), (len(model.segments.owner), element.order + 1)
+        slides = [np.concatenate([unknown[:, None], rows], axis=1) for unknown, rows in layout.sliding]
+        of_rotations = slice(0, tables.of_places)
+        sides, side_of = self._sides()
+        begins = self._given(model, places * element.axes, along[0] * along[1] * element.axes)
+        self.groups = (c.Group * len(model.terms))(*self._groups(model, begins))
+        angles = model.unwrapping.count
+        self.model = c.Model(
+            *(int(element.space), element.components, element.turns, element.axes),
+            *(len(model.rotations.kind), places, tables.displacement_unknowns, tables.rows, len(maps.rows), angles),
+            *(tables.unknowns, tables.rotation_unknowns, tables.total),
+            *(*along, len(model.segments.first), len(model.terms)),
+            None,
+            self._kept(c.integers(model.segments.owner)),
+            None,
+            *(self._map(one) for one in (maps.Y, maps.Z, maps.Z.T, maps.W, maps.W.T)),
+            *(self._map(one.T.absolute) for one in (maps.W, maps.Y)),
+            *(begins[name] for name in ("given", "pull", "shift", "opening", "beside", "force")),
+            int(self.begins[-1]) + 1,
+            self._sums(len(layout.row), *self._sources()),
+            sides,
+            sides,
+            side_of,
+            None,
+            len(layout.retained),
+            self._kept(c.integers(layout.retained)),
+            sum(len(part) for part in slides),
+            self._kept(c.integers(np.concatenate([np.zeros((0, 1 + element.axes)), *slides]))),
+            UNLOADED,
+            self._kept(c.integers(tables.unknown[of_rotations])),
+            self._kept(c.doubles(tables.weight[of_rotations])),
+            None,
+            None,
+            len(layout.row),
+            *(self._kept(c.integers(part)) for part in (layout.row, layout.column, layout.diagonal)),
+        )
+
+    def _kept(self, array: Array) -> int:
+        """Address of an array that lives as long as this."""
+        self._alive.append(array)
+        return int(array.ctypes.data)
+
+    def _map(self, matrix: SparseMap) -> c.Map:
+        start = np.searchsorted(matrix.row, np.arange(matrix.shape[0] + 1))
+        parts = (c.integers(start), c.integers(matrix.column), c.doubles(matrix.value))
+        return c.Map(*matrix.shape, *(self._kept(part) for part in parts))
+
+    def _sums(self, count: int, onto: Array, source: Array, weight: Array) -> c.Sums:
+        """Sums of numbers times weights, each onto one of ``count``, in the order in which they are given."""
+        order = np.argsort(onto, kind="stable")
+        start = np.searchsorted(onto[order], np.arange(count + 1))
+        parts = (c.integers(start), c.integers(source[order]), c.doubles(weight[order]))
+        return c.Sums(count, *(self._kept(part) for part in parts))
+
+    def _given(self, model: Model, on_places: int, pulls: int) -> dict[str, int]:
+        """Where the parts of what is given begin, see ``sf_model``."""
+        loads = [len(group.data) * group.kind.sizes[4] for group in model.connections]
+        sizes = {
+            "pull": pulls,
+            **{f"loads {i}": size for i, size in enumerate(loads)},
+            "shift": on_places,
+            "opening": len(model.positions.rows),
+            "beside": self._tables.total,
+            "force": on_places,
+        }
+        ends = np.cumsum(list(sizes.values())).tolist()
+        return {"given": ends[-1], **{name: end - size for (name, size), end in zip(sizes.items(), ends, strict=True)}}
+
+    def _groups(self, model: Model, begins: dict[str, int]) -> Iterator[c.Group]:
+        for i, (group, tape) in enumerate(zip(model.terms, self.tapes, strict=True)):
+            table, arrays = c.table_of(tape)
+            self._alive += [table, *arrays]
+            part = model.unwrapping.parts[i]
+            turns, places, rows, data, loads = group.kind.sizes
+            yield c.Group(
+                ctypes.addressof(table),
+                *(len(group.data), turns, places, data, loads, rows if i else 0),
+                *(self._kept(c.integers(one)) for one in (group.turns, group.places)),
+                None,
+                -1 if part is None else part.start,
+                self._kept(c.integers(self._layout.rows[i])),
+                begins[f"loads {i - 1}"] if i else begins["pull"],
+                int(self.begins[i]),
+                *(tape.parts[2], tape.parts[3], tape.parts[5], int(group.kind.proportional)),
+            )
+
+    def _cells(self, number: int, part: int) -> Array:
+        """Places (n, width) of a result of a group among all results."""
+        tape = self.tapes[number]
+        rows = self.begins[number] + tape.results * np.arange(self._terms[number])[:, None]
+        return np.asarray(rows + np.arange(tape.parts[part], tape.parts[part + 1]))
+
+    def _sources(self) -> tuple[Array, Array, Array]:
+        """Contributions to the matrix: entries, the results that they are, and weights."""
+        source, factor, layout = list[Array](), list[Array](), self._layout
+        closed = self._tables.closed
+        for number in range(len(self.tapes)):
+            stiffness, jacobian = (self._cells(number, part).ravel() for part in (4, 5))
+            value = np.ones(jacobian.size)
+            if number == 0:
+                jacobian, value = jacobian[closed.entry], closed.value
+            source += [stiffness, jacobian, jacobian]
+            factor += [np.ones(stiffness.size), value, value]
+        # Ties are one times their weight; the diagonal alone adds nothing.
+        places = np.concatenate([*source, [self.begins[-1], 0]]).astype(np.intp)
+        factors = np.concatenate([*factor, [1.0, 0.0]])
+        used = layout.entry < len(places) - 1
+        entry = layout.entry[used]
+        return layout.to_entry[used], places[entry], layout.weight[used] * factors[entry]
+
+    def _sides(self) -> tuple[c.Sums, int]:
+        """Sums of moments and forces on the sides of terms onto the unknowns, and the element of each."""
+        layout, first = self._layout, self._tables.sides[0]
+        source = np.concatenate([self._cells(number, 3).ravel() for number in range(len(self.tapes))])
+        element = np.full(len(source), -1)
+        element[: first.size] = np.repeat(np.arange(len(first)), first.shape[1])
+        order = np.argsort(layout.onto, kind="stable")
+        sums = self._sums(self._tables.total, layout.onto, source[layout.used], layout.share)
+        return sums, self._kept(c.integers(element[layout.used][order]))
+
+
+class CoreModel:
+    """One model for the core, the memory that evaluating takes, and calls.
+
+    Parameters
+    ----------
+    library : CDLL
+        The core.
+    layout : _CoreLayout
+    model : Model
+    noise : ndarray (total,)
+        What rounding leaves of each residual.
+
+    Attributes
+    ----------
+    places : ndarray (places, axes)
+        Displacements of retained places at the last state.
+    pull : ndarray (elements, points, axes)
+        Minus the internal forces at the last state.
+    shared : tuple of int
+        Where the core finds the memory that all points share.
+    """
+
+    def __init__(self, library: ctypes.CDLL, layout: _CoreLayout, model: Model, noise: Array) -> None:
+        self._library, self._layout, self._noise = library, layout, noise
+        self.total, self.entry_count = layout.model.total, layout.model.entry_count
+        self._model = c.Model.from_buffer_copy(layout.model)
+        self._weight = c.doubles(model.beams.weight)
+        self._model.weight, self._model.noise = self._weight.ctypes.data, noise.ctypes.data
+        angles = model.unwrapping
+        if angles.count:
+            crossed = np.asarray(angles.across.any(axis=1))
+            numbers = np.zeros((angles.count, 8))
+            numbers[:, :3], numbers[:, 3:6], numbers[:, 6] = angles.axis, angles.across, np.where(crossed, 1.0, 2.0)
+            self._angles = (numbers, c.integers(np.concatenate([angles.sides, crossed[:, None]], axis=1)))
+            self._model.counted, self._model.counting = (part.ctypes.data for part in self._angles)
+        self._take(model)
+
+    def _take(self, model: Model) -> None:
+        """Take the data of the terms, and make the memory that evaluating takes."""
+        layout = self._layout
+        self._groups = type(layout.groups).from_buffer_copy(layout.groups)
+        self._data = [c.doubles(group.data) for group in model.terms]
+        for group, data in zip(self._groups, self._data, strict=True):
+            group.datum = data.ctypes.data
+        self._model.group = ctypes.addressof(self._groups)
+        self._address = ctypes.addressof(self._model)
+        self._results, self.pull = np.zeros(layout.model.results), np.zeros((*self._weight.shape, model.element.axes))
+        self.places = np.zeros((layout.model.places, model.element.axes))
+        self._work = np.zeros(max(1, self._library.sf_work_size(self._address)))
+        self.shared = tuple(part.ctypes.data for part in (self._results, self.places, self.pull, self._work))
+        self._scratch = CorePoint(self)
+
+    def of(self, model: Model) -> CoreModel:
+        """The same of a model that differs by the data of terms alone, with memory of its own."""
+        found = copy.copy(self)
+        for made in ("_correcting", "_sloping"):
+            found.__dict__.pop(made, None)
+        found._model = c.Model.from_buffer_copy(self._model)
+        found._take(model)
+        return found
+
+    # -- calls ----------------------------------------------------------------------------------------
+
+    def _state(self, q: Array, y: Array, lam: Array, unwrapped: Array) -> tuple[c.State, tuple[Array, ...]]:
+        arrays = tuple(c.doubles(part) for part in (q, y, lam, unwrapped))
+        return c.State(*(part.ctypes.data for part in arrays)), arrays
+
+    def evaluate(self, state: tuple[Array, Array, Array, Array], given: Array) -> Parts:
+        """Results of all terms at a state (q, y, lam, unwrapped); they are overwritten by the next call."""
+        handed, arrays = self._state(*state)
+        self._library.sf_evaluate(self._address, ctypes.addressof(handed), given.ctypes.data, self._scratch.address)
+        del arrays
+        return self.parts
+
+    @property
+    def parts(self) -> Parts:
+        """Results of all terms at the last state."""
+        found = list[list[Array]]()
+        layout = self._layout
+        for number, tape in enumerate(layout.tapes):
+            rows = self._results[layout.begins[number] : layout.begins[number + 1]].reshape(-1, tape.results)
+            found.append([rows[:, a:b] for a, b in zip(tape.parts[:-1], tape.parts[1:], strict=True)])
+        return found
+
+    def at(self, state: tuple[Array, Array, Array, Array], given: Array) -> CorePoint:
+        """The equations at a state (q, y, lam, unwrapped)."""
+        point = CorePoint(self)
+        handed, arrays = self._state(*state)
+        self._library.sf_at(self._address, ctypes.addressof(handed), given.ctypes.data, point.address)
+        del arrays
+        return point
+
+    def moved(self, state: tuple[Array, Array, Array, Array], step: Array) -> tuple[Array, Array, Array, Array]:
+        """The state (q, y, lam, unwrapped) after an increment (total,)."""
+        handed, arrays = self._state(*state)
+        q, y, lam, unwrapped = there = tuple(np.empty(part.shape) for part in arrays)
+        target = c.State(*(part.ctypes.data for part in there))
+        step = c.doubles(step)
+        self._library.sf_move(self._address, ctypes.addressof(handed), step.ctypes.data, 1.0, ctypes.addressof(target))
+        return q, y, lam, unwrapped
+
+    def slope(self, state: tuple[Array, Array, Array, Array], rate: Array) -> Array:
+        """Derivative of the residual (total,) along a rate of what is given, at a state (q, y, lam, unwrapped)."""
+        point, slope = self._scratch, np.empty(self.total)
+        handed, arrays = self._state(*state)
+        rest = (rate.ctypes.data, point.address, slope.ctypes.data, self._sloping.ctypes.data)
+        # Of the point the derivatives of chords are read: they are those of the state.
+        self._library.sf_evaluate(self._address, ctypes.addressof(handed), self._still.ctypes.data, point.address)
+        self._library.sf_slope(self._address, ctypes.addressof(handed), *rest)
+        del arrays
+        return slope
+
+    @functools.cached_property
+    def _sloping(self) -> Array:
+        return np.zeros(self._layout.model.results)
+
+    @functools.cached_property
+    def _still(self) -> Array:
+        """No loads and no motions."""
+        return np.zeros(self._layout.model.given)
+
+    def correct(
+        self,
+        system: CoreSystem,
+        state: tuple[Array, Array, Array, Array],
+        given: Array,
+        tangent: Array | None,
+        border: c.Border | None,
+        limits: c.Limits,
+    ) -> tuple[tuple[Array, Array, Array, Array], CorePoint, c.Report]:
+        """Newton's method from a state (q, y, lam, unwrapped): the last state, the equations there, and how it ended.
+
+        Parameters
+        ----------
+        system : CoreSystem
+            Solves for its steps.
+        state : tuple of ndarray
+        given : ndarray (given,)
+        tangent : ndarray (entries,), optional
+            Entries of the matrix for the first step.
+        border : Border, optional
+            With it the factor is unknown, too, and changed there.
+        limits : Limits
+        """
+        q, y, lam, unwrapped = there = tuple(np.array(part, dtype=float) for part in state)
+        handed = c.State(*(part.ctypes.data for part in there))
+        point, report = CorePoint(self), c.Report()
+        addresses = (system.address, given.ctypes.data, None if tangent is None else tangent.ctypes.data)
+        of_structures = (
+            None if border is None else ctypes.addressof(border),
+            *(ctypes.addressof(limits), ctypes.addressof(handed), point.address),
+        )
+        memory = (self._correcting.ctypes.data, ctypes.addressof(report))
+        while self._library.sf_correct(self._address, *addresses, *of_structures, *memory) == NO_ROOM:
+            system.make_room()
+        return (q, y, lam, unwrapped), point, report
+
+    @functools.cached_property
+    def _correcting(self) -> Array:
+        """Memory that a correction takes."""
+        return np.zeros(self._library.sf_correct_size(self._address))
