@@ -143,8 +143,8 @@ class Solver:
     exact: bool = True
 
     def prepare(self, nlp: NLP) -> Callable[..., NLPResult]:
-        """A function ``(p, guess, lam, lower, upper) -> NLPResult``; each argument defaults to its value in the
-        program.
+        """A function ``(p, guess, lam, lower, upper, within) -> NLPResult``; each argument defaults to its value in the
+        program; ``within`` are the least and largest values of the unknowns.
 
         It raises SolveError where the plugin fails with an error instead of a result.
         """
@@ -152,6 +152,9 @@ class Solver:
         if self.exact and self.plugin == "ipopt":
             options |= _derivatives(nlp)
         function = ca.nlpsol("nlp", self.plugin, {"x": nlp.x, "p": nlp.p, "f": nlp.f, "g": nlp.g}, options)
+        # The function keeps numbers alone: it may be kept longer than the program.
+        usual = {"x0": nlp.guess, "p": nlp.p_value, "lbx": nlp.x_lower, "ubx": nlp.x_upper}
+        usual |= {"lbg": nlp.lower, "ubg": nlp.upper, "lam_g0": np.zeros(nlp.g.numel())}
 
         def solve(
             p: Array | None = None,
@@ -159,17 +162,12 @@ class Solver:
             lam: Array | None = None,
             lower: Array | None = None,
             upper: Array | None = None,
+            within: tuple[Array, Array] | None = None,
         ) -> NLPResult:
+            low, high = within or (None, None)
+            given = {"x0": guess, "p": p, "lbx": low, "ubx": high, "lbg": lower, "ubg": upper, "lam_g0": lam}
             try:
-                solution = function(
-                    x0=nlp.guess if guess is None else guess,
-                    p=nlp.p_value if p is None else p,
-                    lbx=nlp.x_lower,
-                    ubx=nlp.x_upper,
-                    lbg=nlp.lower if lower is None else lower,
-                    ubg=nlp.upper if upper is None else upper,
-                    lam_g0=np.zeros(nlp.g.numel()) if lam is None else lam,
-                )
+                solution = function(**usual | {name: value for name, value in given.items() if value is not None})
             except RuntimeError as error:
                 # What a plugin cannot cope with, CasADi says in many lines, the reason last.
                 reason = str(error).strip().splitlines()[-1]
@@ -242,7 +240,7 @@ class Ipopt:
     extra: Mapping[str, Any] = field(default_factory=dict)
 
     def prepare(self, nlp: NLP) -> Callable[..., NLPResult]:
-        """A function ``(p, guess, lam, lower, upper) -> NLPResult``, as of :meth:`Solver.prepare`."""
+        """A function ``(p, guess, lam, lower, upper, within) -> NLPResult``, as of :meth:`Solver.prepare`."""
         ipopt = {
             "tol": self.tolerance,
             "max_iter": self.iterations,

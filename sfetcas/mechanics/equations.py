@@ -498,6 +498,20 @@ class Equations:
         sizes[: gradients[0].size].reshape(gradients[0].shape)[...] += carried[:, None]
         return self._added(sizes[self.layout.used] * self.layout.absolute_share)
 
+    def convex_entries(self, state: State, loading: Loading) -> Array:
+        """Entries of the Newton matrix with the positive matrices of elements of :attr:`.Element.convex`."""
+        parts = [[*part] for part in self._evaluated(state, loading).groups]
+        if len(parts[0][4]):
+            pull = loading.pull - self._hanging_pulls(loading)[self._owner][:, None, :]
+            constant = self._closing_pulls(state.lam)[self._owner]
+            places = self.retained_places(state, loading)
+            parts[0][4] = self._convex(state.q, places, state.unwrapped, pull, constant)[0]
+        return self._of_parts(parts, convex=False)
+
+    @functools.cached_property
+    def _convex(self) -> GroupBatch:
+        return GroupBatch(self.model, self.model.terms[0], self.model.element.convex)
+
     def slope(self, state: State, point: Point, rate: Loading) -> Array:
         """Derivative of the residual, (unknowns + rows,), along a rate of nodal loads and prescribed displacements."""
         if self._core is not None:

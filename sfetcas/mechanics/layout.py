@@ -45,7 +45,7 @@ def _key(model: Model) -> Any:
     """Everything that a layout is made of."""
     rotations, segments, positions, angles = model.rotations, model.segments, model.positions, model.unwrapping
     arrays = [rotations.turns, rotations.kind, rotations.axis, segments.owner, segments.first, segments.strains]
-    for one in (positions.Y, positions.Z, positions.W):
+    for one in (positions.Y, positions.Z, positions.W, positions.B, positions.BZ):
         arrays += [one.row, one.column, one.value]
     arrays += [positions.retained, angles.sides]
     for group in model.terms:
@@ -84,6 +84,8 @@ class Layout:
         For each group the multipliers of its rows.
     of_core
         The same as the core takes it, once it was made.
+    programs : dict
+        Programs that have been made for models of this structure, by what distinguishes them.
     """
 
     def __init__(self, model: Model) -> None:
@@ -106,6 +108,7 @@ class Layout:
         self.retained = tables.place_number[(model.positions.retained >= 0).all(axis=1)]
         self.sliding = list(self._sliding(model))
         self.of_core: Any = None
+        self.programs: dict[Any, Any] = {}
         # What is kept keeps no scene alive.
         del tables.model
 

@@ -9,8 +9,9 @@ followed from zero loads.  Where something touches nothing is least in where it 
 equilibrium, and where they fail what is given becomes another little by little.
 From an equilibrium for other values Newton's whole steps are tried first.
 
-Every operation on numbers is one of the functions of :class:`~sfetcas.solvers.program.Program`; generated C takes the
-same decisions on the same numbers, with the same :class:`Rules`.
+Every operation on numbers is one of a :class:`Method`: the functions of :class:`~sfetcas.solvers.program.Program`,
+whose numbers generated C has to the last bit, with the same decisions and the same :class:`Rules`; or
+:class:`~sfetcas.solvers.evaluated.Evaluated`, which makes nothing for a model.
 
 Sources: Nocedal and Wright 2006, chapters 3 and 18 (line search on an l1 merit function); Vanderbei 1995
 (quasidefinite matrices have factors in any order).
@@ -20,17 +21,17 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, Protocol
 
-import casadi as ca
 import numpy as np
 
 from .. import tolerances
-from ..mathematics.arrays import TINY, Array
-from ..mathematics.linear import places_of
-from .program import Program
+from ..mathematics.arrays import TINY, Array, Index
+from ..mechanics.equations import Equations
+from ..mechanics.model import Model
 from .sides import Sides
 
-__all__ = ["MEANINGS", "NOT_DEFINED", "Code", "Globalised", "Outcome", "Rules"]
+__all__ = ["MEANINGS", "NOT_DEFINED", "Code", "Globalised", "Method", "Outcome", "Rules", "Shifts", "Systems"]
 
 
 class Code(enum.IntEnum):
@@ -171,18 +172,104 @@ class Outcome:
 
 @dataclass(frozen=True)
 class _Here:
-    """A state with the results of :attr:`Program.at`; ``size`` is the relative residual, ``gaps`` a sum."""
+    """A state with the results of :meth:`Method.at`; ``size`` is the relative residual, ``gaps`` a sum."""
 
-    state: ca.DM
+    state: Any
     residual: Array
     size: float
     potential: float
     gaps: float
-    entries: ca.DM
+    entries: Any
 
 
-def _flat(values: ca.DM) -> Array:
-    return np.array(values).ravel()
+class Shifts(NamedTuple):
+    """How the diagonals of matrices are shifted: see :class:`Globalised` and :class:`Rules`."""
+
+    proximal: float
+    mass: Array
+    soft: Array
+    diagonal: Index
+
+    def shifted(self, entries: Array, firm: float, share: float) -> tuple[Array, Array]:
+        """The entries that are solved for, and those of the matrix that is factorised."""
+        target = entries.copy()
+        target[self.diagonal] += (self.proximal + firm) * self.mass
+        matrix = target.copy()
+        matrix[self.diagonal] += share * self.soft
+        return target, matrix
+
+
+class Systems(Protocol):
+    """Linear systems of the method."""
+
+    def shift(self, entries: Any, firm: float, share: float) -> None:
+        """Take a matrix with its diagonal shifted."""
+
+    def negative(self) -> int | None:
+        """Factorise it: the number of its negative pivots; None where factors break down."""
+
+    def backward(self, b: Array) -> Array:
+        """Solution (total,) with these factors, or with pivoting."""
+
+    def left(self, x: Array, b: Array) -> Array:
+        """What is left (total,) of b without the further regularisation."""
+
+
+class Method(Protocol):
+    """Operations on numbers of which the method consists; states and what is given are of types of their own."""
+
+    model: Model
+    equations: Equations
+
+    @property
+    def states(self) -> int:
+        """Numbers of a state."""
+
+    @property
+    def diagonal(self) -> Index:
+        """Positions of the diagonal among the entries of the matrix."""
+
+    def systems(self, shifts: Shifts, *, factors: bool, pivoted: bool) -> Systems:
+        """Its linear systems."""
+
+    def is_finite(self, given: Any) -> bool:
+        """Whether all that is given is."""
+
+    def turns(self, given: Any) -> bool:
+        """Whether there are moments."""
+
+    def taken(self, given: Any) -> Any:
+        """What is given as the other methods take it."""
+
+    def shared(self, given: Any, share: float) -> Any:
+        """The same with a share of all loads and motions."""
+
+    def standing(self, flat: Array) -> Any:
+        """The state of a vector (states,)."""
+
+    def flattened(self, state: Any) -> Array:
+        """The vector (states,) of a state."""
+
+    def multipliers(self, state: Any) -> Array:
+        """Its multipliers (rows,)."""
+
+    def begin(self, given: Any) -> Any:
+        """The undeformed state with prescribed rotations at their values."""
+
+    def hold(self, state: Any, given: Any) -> Any:
+        """A state with prescribed rotations at their values."""
+
+    def at(self, state: Any, given: Any) -> Any:
+        """Residual (total,), relative residual, potential, sum of gaps, and entries of the matrix."""
+
+    def merit(self, state: Any, given: Any) -> Any:
+        """Potential and sum of gaps."""
+
+    def convex(self, state: Any, given: Any) -> Any:
+        """Entries of the matrix with positive matrices of the elements."""
+
+    def move(self, state: Any, step: Array, share: float) -> Any:
+        """The state after a share of a step (total,)."""
 
 
 class Globalised:
@@ -190,7 +277,7 @@ class Globalised:
 
     Parameters
     ----------
-    program : Program
+    program : Method
     weight : ndarray (rotation unknowns,)
         See :class:`~sfetcas.solvers.stability.StabilityTest`.
     rules : Rules, optional
@@ -210,7 +297,7 @@ class Globalised:
 
     def __init__(
         self,
-        program: Program,
+        program: Method,
         weight: Array,
         rules: Rules | None = None,
         begun: tuple[Array, Array] | None = None,
@@ -229,58 +316,38 @@ class Globalised:
         self.soft = np.repeat(
             [0.0, 1.0, -1.0], [self._rotation_unknowns, self._unknowns - self._rotation_unknowns, equations.rows]
         )
-        row, column = places_of(program.sparsity)
-        self.diagonal = np.flatnonzero(row == column)
+        self.diagonal = program.diagonal
         # Start vector for the lowest mode: the fields of the rule of sides, and tiny displacements.
         beside = LEAST / (1.0 + np.arange(self._unknowns - self._rotation_unknowns))
         self.seed = np.concatenate([Sides(equations).seed, beside, np.zeros(equations.rows)])
-        # Large vectors stay in CasADi's type between functions: conversion costs more than most of these calls.
-        self._made_firm = self._firmness()
         self._symmetric = program.model.has_potential
         # Where a line ends the Lagrangian has no curvature along the member: there is no order without small pivots.
         self.pivoted = not self._symmetric or program.model.mesh.lies
         self._sliding = program.model.mesh.sliding
-        if self._symmetric and self._total:
-            self._solver = ca.Linsol("globalised", "ldl", program.sparsity)
-            self._solver.sfact(ca.DM(program.sparsity, 1.0))
+        shifts = Shifts(self.rules.proximal, self.mass, self.soft, self.diagonal)
+        self._systems = program.systems(shifts, factors=self._symmetric and self._total > 0, pivoted=self.pivoted)
         self._left = 0
 
     # -- linear algebra -----------------------------------------------------------------------------
 
-    def _firmness(self) -> ca.Function:
-        """(entries, firm, soft) -> entries with their diagonal shifted, and the matrix of these that is factorised."""
-        entries, firm = ca.MX.sym("entries", self.program.sparsity.nnz()), ca.MX.sym("firm")
-        share = ca.MX.sym("soft")
-        diagonal = self.diagonal.tolist()
-        target = ca.MX(entries)
-        target[diagonal] = target[diagonal] + (self.rules.proximal + firm) * ca.DM(self.mass)
-        soft = ca.MX(target)
-        soft[diagonal] = soft[diagonal] + share * ca.DM(self.soft)
-        return ca.Function("firmness", [entries, firm, share], [target, ca.MX(self.program.sparsity, soft)])
-
-    def _factor(self, entries: ca.DM, firm: float) -> int:
+    def _factor(self, entries: Any, firm: float) -> int:
         """Factorise a matrix with its diagonal shifted; the number of its negative pivots less that of rows.
 
         Nor are places that slide counted.  :data:`FAILED` if the factors break down, 0 for unsymmetric matrices.
         """
-        self._target, self._matrix = self._made_firm(entries, firm, self.rules.soft)
+        systems = self._systems
+        systems.shift(entries, firm, self.rules.soft)
         if not self._symmetric or not self._total:
             return 0
-        try:
-            self._solver.nfact(self._matrix)
-        except RuntimeError:
+        pivots = systems.negative()
+        if pivots is None:
             return FAILED
-        negative = int(self._solver.neig(self._matrix)) - (self._total - self._unknowns) - self._sliding
         if self.pivoted:
-            _, self._matrix = self._made_firm(entries, firm, self.rules.hard)
-        return negative
+            systems.shift(entries, firm, self.rules.hard)
+        return pivots - (self._total - self._unknowns) - self._sliding
 
     def _backward(self, b: Array) -> Array:
-        if not self._total:
-            return b
-        if self.pivoted:
-            return _flat(self.program.linear(self._matrix.nz[:], b))
-        return _flat(self._solver.solve(self._matrix, b))
+        return self._systems.backward(b) if self._total else b
 
     def _solved(self, b: Array) -> Array | None:
         """Solution (total,) for the last matrix without the further regularisation, by refinement; None if it fails."""
@@ -288,7 +355,7 @@ class Globalised:
         largest = float(np.abs(b).max(initial=0.0))
         for _ in range(self.rules.rounds):
             x = x + self._backward(left)
-            left = _flat(self.program.left(self._target, x, b))
+            left = self._systems.left(x, b)
             size = float(np.abs(left).max(initial=0.0))
             if not size < last:
                 break
@@ -302,7 +369,7 @@ class Globalised:
         negative = self._factor(here.entries, 0.0)
         return (None if negative == FAILED else self._solved(-here.residual)), negative
 
-    def _downwards(self, here: _Here, given: ca.DM) -> Array | None:
+    def _downwards(self, here: _Here, given: Any) -> Array | None:
         """A descent direction (total,) from a matrix that is positive on the closings; None if no shift gives one."""
         entries = self.program.convex(here.state, given)
         firm = 0.0
@@ -316,43 +383,41 @@ class Globalised:
 
     # -- states ---------------------------------------------------------------------------------------
 
-    def _at(self, state: ca.DM, given: ca.DM) -> _Here:
+    def _at(self, state: Any, given: Any) -> _Here:
         residual, size, potential, gaps, entries = self.program.at(state, given)
-        return _Here(state, _flat(residual), float(size), float(potential), float(gaps), entries)
+        flat = np.asarray(residual, dtype=float).ravel()
+        return _Here(state, flat, float(size), float(potential), float(gaps), entries)
 
-    def _moved(self, state: ca.DM, step: Array, share: float) -> ca.DM:
+    def _moved(self, state: Any, step: Array, share: float) -> Any:
         return self.program.move(state, step, share)
 
     def _length(self, step: Array) -> float:
         return float(np.abs(step[: self._rotation_unknowns]).max(initial=0.0))
 
-    def _multipliers(self, state: ca.DM) -> Array:
-        end = self.program.states - self.program.expressions.layout.unwrapped
-        return _flat(state[end - (self._total - self._unknowns) : end])
-
     # -- the method -----------------------------------------------------------------------------------
 
     # Overflow is detected by results that are not finite, as in C.
     @np.errstate(over="ignore", invalid="ignore")
-    def __call__(self, given: Array, start: Array | None = None, *, warm: bool = False) -> Outcome:
+    def __call__(self, given: Any, start: Array | None = None, *, warm: bool = False) -> Outcome:
         """Solve for an equilibrium.
 
         Parameters
         ----------
-        given : ndarray (given,)
-            Loads and data that vary, dimensionless, see :meth:`~sfetcas.solvers.program.Program.given_of`.
+        given : ndarray (given,) or Loading
+            Loads and data that vary, dimensionless, as the method takes them: see
+            :meth:`~sfetcas.solvers.program.Program.given_of`.
         start : ndarray (states,), optional
             State to begin with; the undeformed one by default.
         warm : bool
             Whether that is an equilibrium for other values, from which whole steps are tried first.
         """
         program, rules = self.program, self.rules
-        if not np.isfinite(given).all() or (start is not None and not np.isfinite(start).all()):
+        if not program.is_finite(given) or (start is not None and not np.isfinite(start).all()):
             return Outcome(Code.BAD_ARGUMENT, np.full(program.states, np.nan), np.inf, NOT_DEFINED, 0)
         self._left = rules.iterations
-        self._free = not given[program.slice_of_moments].any()
-        whole = ca.DM(given)
-        state = program.begin(whole) if start is None else program.hold(start, whole)
+        self._free = not program.turns(given)
+        whole = program.taken(given)
+        state = program.begin(whole) if start is None else program.hold(program.standing(start), whole)
         found = self._near(state, whole) if warm else None
         found = found or self._from(state, whole)
         if found.code not in (Code.SOLVED, Code.UNSTABLE) and self._left:
@@ -364,7 +429,7 @@ class Globalised:
             found = replace(found, code=Code.NOT_FINITE)
         return replace(found, iterations=rules.iterations - self._left)
 
-    def _near(self, state: ca.DM, given: ca.DM) -> Outcome | None:
+    def _near(self, state: Any, given: Any) -> Outcome | None:
         """By whole steps to an equilibrium that need not be left; None where they do not lead to one."""
         found = self._corrected(self._at(state, given), given, self.rules.corrections)
         if found.code is not Code.SOLVED:
@@ -374,21 +439,22 @@ class Globalised:
         leaves = self.rules.escapes and self.program.model.downhill
         return None if leaves else replace(found, code=Code.UNSTABLE)
 
-    def _from(self, state: ca.DM, given: ca.DM) -> Outcome:
+    def _from(self, state: Any, given: Any) -> Outcome:
         """Downhill from a state to an equilibrium, and on from unstable ones, ``escapes`` times."""
-        if not self.program.model.downhill:
+        program = self.program
+        if not program.model.downhill:
             return self._corrected(self._at(state, given), given, self._left)
         for _ in range(self.rules.escapes + 1):
             found = self._descended(self._at(state, given), given)
             if found.code is not Code.SOLVED or found.negative <= 0:
                 return found
-            state = self._nudged(ca.DM(found.state), given)
+            state = self._nudged(program.standing(found.state), given)
         return replace(found, code=Code.UNSTABLE)
 
     def _ended(self, code: Code, here: _Here, negative: int = NOT_DEFINED) -> Outcome:
-        return Outcome(code, _flat(here.state), here.size, negative, 0)
+        return Outcome(code, self.program.flattened(here.state), here.size, negative, 0)
 
-    def _descended(self, here: _Here, given: ca.DM) -> Outcome:
+    def _descended(self, here: _Here, given: Any) -> Outcome:
         """Downhill to an equilibrium, stable or not."""
         rules, scale, first = self.rules, 1.0, True
         while self._left:
@@ -421,10 +487,10 @@ class Globalised:
             here, scale = found
         return self._ended(Code.ITERATIONS, here)
 
-    def _shortened(self, here: _Here, step: Array, scale: float, given: ca.DM) -> tuple[_Here, float] | None:
+    def _shortened(self, here: _Here, step: Array, scale: float, given: Any) -> tuple[_Here, float] | None:
         """The state after a step that is halved until potential and gaps fall enough, and its share; None if never."""
         rules, n = self.rules, self._unknowns
-        lam = self._multipliers(here.state)
+        lam = self.program.multipliers(here.state)
         penalty = 2.0 * float(np.abs(lam + step[n:]).max(initial=0.0))
         # The slope of the potential alone: the residual without the multipliers' share.
         slope = float(here.residual[:n] @ step[:n]) + float(lam @ here.residual[n:]) - penalty * here.gaps
@@ -444,7 +510,7 @@ class Globalised:
 
     # -- out of what is unstable ----------------------------------------------------------------------
 
-    def _nudged(self, state: ca.DM, given: ca.DM) -> ca.DM:
+    def _nudged(self, state: Any, given: Any) -> Any:
         """The state displaced along its lowest mode to the side of lower energy."""
         shape = self._softest(self._at(state, given).entries)
         shape *= self.rules.nudge / max(self._length(shape), TINY)
@@ -453,7 +519,7 @@ class Globalised:
         # A symmetric pair differs by rounding only: then the first side, so that answers repeat.
         return sides[1] if up - down > tolerances.LEVEL * max(abs(up), abs(down)) else sides[0]
 
-    def _softest(self, entries: ca.DM) -> Array:
+    def _softest(self, entries: Any) -> Array:
         """The mode (total,) of the lowest eigenvalue, largest entry 1, by inverse iteration with a shift below it."""
         firm = self.rules.firm
         while self._factor(entries, firm) != 0 and firm < FIRMEST:
@@ -470,7 +536,7 @@ class Globalised:
     def _followed(self, given: Array) -> Outcome:
         """The equilibrium that is reached as the loads grow from zero, or what is given becomes another."""
         program, rules = self.program, self.rules
-        begin = program.begin(self._shared(given, 0.0)) if self.begun is None else ca.DM(self.begun[1])
+        begin = program.begin(self._shared(given, 0.0)) if self.begun is None else program.standing(self.begun[1])
         share, reached, step = 0.0, begin, 1.0
         found = None
         while share < 1.0 and self._left:
@@ -479,25 +545,25 @@ class Globalised:
             there_begun = program.hold(reached, loads)
             found = self._corrected(self._at(there_begun, loads), loads, rules.corrections)
             if found.code is Code.SOLVED:
-                share, reached, step = there, ca.DM(found.state), 2.0 * step
+                share, reached, step = there, program.standing(found.state), 2.0 * step
                 continue
             step *= 0.5
             if step < rules.shortest:
                 return found
         if found is None or share < 1.0:
-            return Outcome(Code.ITERATIONS, _flat(reached), np.inf, NOT_DEFINED, 0)
+            return Outcome(Code.ITERATIONS, program.flattened(reached), np.inf, NOT_DEFINED, 0)
         if found.negative > 0 and rules.escapes and program.model.downhill:
-            return self._from(self._nudged(reached, ca.DM(given)), ca.DM(given))
+            whole = program.taken(given)
+            return self._from(self._nudged(reached, whole), whole)
         return found
 
-    def _shared(self, given: Array, share: float) -> ca.DM:
+    def _shared(self, given: Any, share: float) -> Any:
         """What is given with a share of all loads and motions, but for data; or on the way to it from the start."""
         if self.begun is not None:
-            return ca.DM(self.begun[0] + share * (given - self.begun[0]))
-        loads = self.program.slice_of_loads
-        return ca.DM(np.concatenate([given[: loads.start], share * given[loads]]))
+            return self.program.taken(self.begun[0] + share * (given - self.begun[0]))
+        return self.program.shared(given, share)
 
-    def _corrected(self, here: _Here, given: ca.DM, most: int) -> Outcome:
+    def _corrected(self, here: _Here, given: Any, most: int) -> Outcome:
         """Newton's method from a near state."""
         rules, last, first = self.rules, np.inf, True
         for _ in range(min(most, self._left)):

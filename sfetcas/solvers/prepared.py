@@ -16,22 +16,20 @@ from ..description.showing import shown
 from ..errors import SolveError, Status
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
-from ..mathematics.keeping import kept
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt, NLPResult
 from ..mechanics.equations import Equations, Point, State
-from ..mechanics.expressions import Expressions
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from ..mechanics.memory import Remembering
 from ..mechanics.model import Model
 from .constraints import Diagnosis, contradiction, diagnose, free_motions
 from .divergence import TangentTest
+from .evaluated import Evaluated
 from .globalised import Code, Globalised, Rules
 from .guess import first_guess, lacks_slack, restore
 from .newton import AtLoads, Limits, correct
 from .problem import EquilibriumProblem
-from .program import Program
 from .pseudo_transient import flow
 from .redundancy import loose_rows, stretched
 from .sharing import shared
@@ -58,6 +56,9 @@ in balance there falls without end (1e20 was found); those of stiff members reac
 
 PRESTRESSED = 1e-3
 """Largest rotation, rad, between an equilibrium and the same one without prestress of redundant members."""
+
+PROGRAMS = 8
+"""Programs that are kept for models of one structure: one for each power of ten of the loads."""
 
 MOST_SWITCHES, FALLEN = 8, 400
 """Largest number of attempts to leave unstable equilibria, and of iterations spent on those that fail."""
@@ -97,7 +98,7 @@ class Prepared:
         memory, found = Remembering(self.model), copy.copy(self)
         found.model = memory.model_with(memory.after(state.q, state.y, memory.begun))
         # What is made of the equations is made anew; what is known of the undeformed structure stays.
-        for made in ("_test", "_tangent", "_problem", "_globalised", "_kept__solvers"):
+        for made in ("_test", "_tangent", "_problem", "_globalised"):
             found.__dict__.pop(made, None)
         found.equations = self.equations.remembering(found.model)
         return found
@@ -137,9 +138,15 @@ class Prepared:
     def _ipopt(self, scale: float) -> Callable[..., NLPResult]:
         return self._solvers(10.0 ** round(np.log10(scale)))
 
-    @kept(8)
     def _solvers(self, scale: float) -> Callable[..., NLPResult]:
-        return Ipopt(iterations=ITERATIONS, objective_scale=1.0 / scale, extra=STALLED).prepare(self._problem.nlp)
+        """IPOPT for models of this structure, whose data are parameters of one program."""
+        known, key = self.equations.layout.programs, (self.kernels, scale)
+        if key not in known:
+            method = Ipopt(iterations=ITERATIONS, objective_scale=1.0 / scale, extra=STALLED)
+            known[key] = method.prepare(self._problem.nlp)
+            while len(known) > PROGRAMS:
+                del known[next(iter(known))]
+        return known[key]
 
     def guess(self, loading: Loading, *, settle: bool = True) -> tuple[State, float]:
         """A start state and its largest gap, dimensionless, see :func:`~sfetcas.solvers.guess.first_guess`."""
@@ -246,6 +253,7 @@ class Prepared:
             p=problem.parameters(loading, state),
             guess=problem.unknowns(state),
             lam=problem.multipliers(state) / scale,
+            within=problem.limits,
         )
         self._spent += result.iterations
         trial = problem.state(result.x, result.lam, loading, state)
@@ -297,19 +305,17 @@ class Prepared:
 
     @functools.cached_property
     def _globalised(self) -> Globalised:
-        expressions = Expressions(self.equations, self.kernels, self._evaluations)
-        return Globalised(Program(expressions), self.weight, Rules(escapes=0))
+        return Globalised(Evaluated(self.equations), self.weight, Rules(escapes=0))
 
     def globalised(self, loading: Loading) -> tuple[Solved | None, int]:
         """The equilibrium by the globalised Newton method, stable or not, and its iterations; None if it fails."""
-        method = self._globalised
-        start = None
+        method, start = self._globalised, None
         if self.lacks_slack or self.started:
-            start = method.program.flat(self.guess(loading)[0])
-        outcome = method(method.program.given_of(loading), start)
+            start = method.program.flattened(self.guess(loading)[0])
+        outcome = method(loading, start)
         if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
             return None, outcome.iterations
-        found = self.correct(method.program.state(outcome.state), loading)
+        found = self.correct(method.program.standing(outcome.state), loading)
         return (found if found.residual <= tolerances.BALANCED else None), outcome.iterations
 
     def downhill(self, state: State, loading: Loading) -> Solved | None:

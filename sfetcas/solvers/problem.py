@@ -20,8 +20,9 @@ from ..mathematics.constants import added, picked, sparse, times
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import NLP
 from ..mathematics.quaternion import product
+from ..mechanics.beams import ELEMENT_DATA
 from ..mechanics.equations import State
-from ..mechanics.expressions import Given, SymbolicTerms, data_of
+from ..mechanics.expressions import Given, SymbolicTerms
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rings import reach_of_rings
@@ -51,44 +52,54 @@ class EquilibriumProblem:
 
     Attributes
     ----------
-    nlp : NLP
-        The program of the loading; its objective is the potential energy over ``model.scales.moment``.
-    x, p : MX (unknowns,) and (parameters,)
-        Unknowns and parameters (loads, prescribed motions, values near which angles count), dimensionless.
     row_names : tuple of str
         Names of all rows: norms, then closings and joints.
     """
 
     def __init__(self, model: Model, loading: Loading, guess: State, *, kernels: Kernels = "auto") -> None:
         self.model = model
-        self._guessed_unwrapped = guess.unwrapped
-        self.terms = SymbolicTerms(Tables(model, components=True), kernels, CALLS)
-        self._tables = self.terms.tables
-        self._symbols()
+        self._loading, self._guess, self._guessed_unwrapped = loading, guess, guess.unwrapped
+        self._tables, self._kernels = Tables(model, components=True), kernels
+        norms = [f"norm of rotation {i}" for i in self._unit]
+        self.row_names = (*norms, *model.row_names)
+
+    # What only a program to be built takes is made when it is asked for.
+
+    @functools.cached_property
+    def nlp(self) -> NLP:
+        """The program of the loading; its objective is the potential energy over ``model.scales.moment``."""
         gaps = self.terms.gaps_of(self._arguments, self._y, self._given)
-        self.nlp = NLP(
+        lower, upper = self.limits
+        return NLP(
             x=self.x,
             p=self.p,
             f=self._objective(),
             g=ca.vertcat(self._norms(), gaps),
             lower=np.zeros(len(self.row_names)),
             upper=np.zeros(len(self.row_names)),
-            x_lower=self._limits(-1),
-            x_upper=self._limits(1),
-            guess=self.unknowns(guess),
-            p_value=self.parameters(loading),
+            x_lower=lower,
+            x_upper=upper,
+            guess=self.unknowns(self._guess),
+            p_value=self.parameters(self._loading),
             rows=self.row_names,
             gradient=self._gradient(),
             jacobian=self._jacobian(),
             hessian=self._hessian,
         )
 
-    def _limits(self, side: int) -> Array:
-        """Least (-1) or largest (1) values of the unknowns: beyond the end of its member a ring would fall for ever."""
-        limits = np.full(self.x.numel(), side * np.inf)
-        for number, low, high in reach_of_rings(self.model):
-            limits[self._tables.rotation_unknowns + number] = low if side < 0 else high
-        return limits
+    @functools.cached_property
+    def terms(self) -> SymbolicTerms:
+        """The terms of the model as expressions."""
+        return SymbolicTerms(self._tables, self._kernels, CALLS)
+
+    @property
+    def limits(self) -> tuple[Array, Array]:
+        """Least and largest values of the unknowns: beyond the end of its member a ring would fall for ever."""
+        low, high = (np.full(self._tables.unknowns, side) for side in (-np.inf, np.inf))
+        first = self._tables.rotation_unknowns
+        for number, least, most in reach_of_rings(self.model):
+            low[first + number], high[first + number] = least, most
+        return low, high
 
     def slid_off(self, x: Array) -> str:
         """A sentence on a ring that unknowns keep at an end of its member; empty where none is."""
@@ -100,23 +111,52 @@ class EquilibriumProblem:
 
     # -- symbols --------------------------------------------------------------------------------
 
-    def _symbols(self) -> None:
-        model, element, tables = self.model, self.model.element, self._tables
-        self.x = ca.MX.sym("x", tables.unknowns)
-        _, self._y = ca.vertsplit(self.x, [0, tables.rotation_unknowns, tables.unknowns])
-        points = model.beams.weight.size
-        sizes = (
-            points * element.axes,
+    @functools.cached_property
+    def x(self) -> ca.MX:
+        """The unknowns (unknowns,), dimensionless."""
+        return ca.MX.sym("x", self._tables.unknowns)
+
+    @functools.cached_property
+    def p(self) -> ca.MX:
+        """The parameters (parameters,), dimensionless: loads, motions, values near which angles count, and data."""
+        return ca.MX.sym("p", sum(self._sizes))
+
+    @functools.cached_property
+    def _y(self) -> ca.MX:
+        return ca.vertsplit(self.x, [0, self._tables.rotation_unknowns, self._tables.unknowns])[1]
+
+    @functools.cached_property
+    def _sizes(self) -> tuple[int, ...]:
+        """Numbers of the parameters, part by part: as in :meth:`parameters`."""
+        model, tables = self.model, self._tables
+        return (
+            model.beams.weight.size * model.element.axes,
             tables.of_places,
             model.positions.B.shape[1],
             model.positions.B.shape[1],
             model.unwrapping.count,
             *(len(group.data) * group.kind.sizes[4] for group in model.connections),
+            *(part.size for part in self._data),
         )
-        self.p = ca.MX.sym("p", sum(sizes))
-        pull, rest, force, shift, self._unwrapped, *loads = ca.vertsplit(self.p, np.cumsum([0, *sizes]).tolist())
-        self._given = Given(
-            **data_of(model),
+
+    @property
+    def _data(self) -> list[Array]:
+        """Data of all elements and of each group of connections, part by part."""
+        beams = self.model.beams
+        return [*(getattr(beams, name) for name in ELEMENT_DATA), *(group.data for group in self.model.connections)]
+
+    @functools.cached_property
+    def _parts(self) -> tuple[ca.MX, Given, ca.MX]:
+        """Prescribed rotations, what is given, and values near which angles count."""
+        element, beams, count = self.model.element, self.model.beams, len(self.model.connections)
+        pull, rest, force, shift, unwrapped, *more = ca.vertsplit(self.p, np.cumsum([0, *self._sizes]).tolist())
+        loads, own, data = more[:count], more[count : count + len(ELEMENT_DATA)], more[count + len(ELEMENT_DATA) :]
+        widths = (element.stiffnesses, element.axes, beams.compliance.shape[-1])
+        points = beams.weight.size
+        groups = zip(data, self.model.connections, strict=True)
+        given = Given(
+            **{name: ca.reshape(own[i], widths[i], points) for i, name in enumerate(ELEMENT_DATA)},
+            data=tuple(ca.reshape(part, group.kind.sizes[3], len(group.data)) for part, group in groups),
             pull=pull,
             force=force,
             shift=shift,
@@ -124,12 +164,26 @@ class EquilibriumProblem:
             spread=ca.MX(),
             loads=tuple(loads),
         )
+        return rest, given, unwrapped
+
+    @property
+    def _given(self) -> Given:
+        return self._parts[1]
+
+    @functools.cached_property
+    def _q(self) -> ca.MX:
+        """Components of all rotations, (components, rotations)."""
+        rest, tables = self._parts[0], self._tables
         turned = rest + times(self._spread, self.x) if tables.of_places else rest
-        self._q = ca.reshape(turned, element.components, len(model.rotations.kind))
-        self._places = self.terms.retained_places(self._y, self._given)
-        self._arguments = self.terms.every(self._q, self._places, self._given, self._unwrapped)
-        norms = [f"norm of rotation {i}" for i in self._unit]
-        self.row_names = (*norms, *model.row_names)
+        return ca.reshape(turned, self.model.element.components, len(self.model.rotations.kind))
+
+    @functools.cached_property
+    def _places(self) -> ca.MX:
+        return self.terms.retained_places(self._y, self._given)
+
+    @functools.cached_property
+    def _arguments(self) -> list[list[ca.MX]]:
+        return self.terms.every(self._q, self._places, self._given, self._parts[2])
 
     @functools.cached_property
     def _spread(self) -> ca.DM:
@@ -268,10 +322,10 @@ class EquilibriumProblem:
         unwrapped = self._guessed_unwrapped if near is None else near.unwrapped
         loads = [load.ravel() for load in loading.loads]
         parts = [pull.ravel(), rest.ravel(), loading.force.ravel(), loading.shift, unwrapped, *loads]
-        return np.concatenate(parts)
+        return np.concatenate([*parts, *(part.ravel() for part in self._data)])
 
     def parameters_by(self, given: Given, unwrapped: Array) -> ca.MX:
-        """The parameters (parameters,) as an expression of loads and motions; data are those of the model.
+        """The parameters (parameters,) as an expression of what is given.
 
         ``unwrapped`` (angles,), rad, are the values near which angles count turns.
         """
@@ -281,7 +335,9 @@ class EquilibriumProblem:
             # Fixed rotations without a prescribed motion are identities.
             still[0] = fixed
         turned = self.terms.with_prescribed_rotations(ca.MX(ca.DM(still)), given)
-        return ca.vertcat(given.pull, ca.vec(turned), given.force, given.shift, ca.MX(ca.DM(unwrapped)), *given.loads)
+        data = [*(getattr(given, name) for name in ELEMENT_DATA), *given.data]
+        loads = [given.pull, ca.vec(turned), given.force, given.shift, ca.MX(ca.DM(unwrapped)), *given.loads]
+        return ca.vertcat(*loads, *(ca.vec(part) for part in data))
 
     def unknowns(self, state: State) -> Array:
         """The unknowns (unknowns,) of the program at a state, dimensionless."""

@@ -16,9 +16,9 @@ import casadi as ca
 import numpy as np
 
 from ..mathematics.active import applied
-from ..mathematics.arrays import Array, numbers
+from ..mathematics.arrays import Array, Index, numbers
 from ..mathematics.constants import sparse, times
-from ..mathematics.linear import pattern
+from ..mathematics.linear import pattern, places_of
 from ..mechanics.beams import ELEMENT_DATA
 from ..mechanics.equations import State
 from ..mechanics.evaluation import UNLOADED
@@ -29,6 +29,7 @@ from ..mechanics.rotations import RotationFreedom
 from ..mechanics.singles import counted_angle, turned_vector
 from ..mechanics.stationarity import Stationarity, summed
 from ..mechanics.terms import GROUND, energies_of
+from .globalised import Shifts
 from .residuals import LEAST_SCALE
 
 __all__ = ["Program", "data_of", "is_data"]
@@ -109,6 +110,49 @@ class Program:
         if base == "pull" and self.expressions.reaching.nnz():
             return numbers(part.ravel() - applied(self.expressions.reaching.T, loading.force.ravel()))
         return numbers(part.ravel())
+
+    # -- as a method, see :class:`~sfetcas.solvers.globalised.Method` ------------------------------
+
+    # Large vectors stay in CasADi's type between functions: conversion costs more than most calls.
+
+    def systems(self, shifts: Shifts, *, factors: bool, pivoted: bool) -> _Systems:
+        """Linear systems of :class:`~sfetcas.solvers.globalised.Globalised`."""
+        return _Systems(self, shifts, factors=factors, pivoted=pivoted)
+
+    @functools.cached_property
+    def diagonal(self) -> Index:
+        """Positions of the diagonal among the entries of the matrix."""
+        row, column = places_of(self.sparsity)
+        return np.flatnonzero(row == column)
+
+    def is_finite(self, given: Array) -> bool:
+        """Whether all that is given is."""
+        return bool(np.isfinite(given).all())
+
+    def turns(self, given: Array) -> bool:
+        """Whether there are moments."""
+        return bool(given[self.slice_of_moments].any())
+
+    def taken(self, given: Array) -> ca.DM:
+        """What is given as the functions take it."""
+        return ca.DM(given)
+
+    def shared(self, given: Array, share: float) -> ca.DM:
+        """The same with a share of all loads and motions."""
+        loads = self.slice_of_loads
+        return ca.DM(np.concatenate([given[: loads.start], share * given[loads]]))
+
+    def standing(self, flat: Array) -> ca.DM:
+        """The state of a vector (states,) as the functions take it."""
+        return ca.DM(flat)
+
+    def flattened(self, state: ca.DM) -> Array:
+        """The vector (states,) of such a state."""
+        return np.array(state).ravel()
+
+    def multipliers(self, state: ca.DM) -> Array:
+        """Its multipliers (rows,)."""
+        return np.array(state[self._bounds[2] : self._bounds[3]]).ravel()
 
     # -- states -----------------------------------------------------------------------------------
 
@@ -445,3 +489,39 @@ def data_of(model: Model) -> dict[str, Array]:
 def is_data(name: str) -> bool:
     """Whether the name of a part of what is given is that of data, not of loads or motions."""
     return name in ELEMENT_DATA or name.startswith("data_")
+
+
+class _Systems:
+    """Linear systems by CasADi's functions, as generated C has them."""
+
+    def __init__(self, program: Program, shifts: Shifts, *, factors: bool, pivoted: bool) -> None:
+        self._program, self._pivoted = program, pivoted
+        entries, firm, share = ca.MX.sym("entries", program.sparsity.nnz()), ca.MX.sym("firm"), ca.MX.sym("soft")
+        diagonal = shifts.diagonal.tolist()
+        target = ca.MX(entries)
+        target[diagonal] = target[diagonal] + (shifts.proximal + firm) * ca.DM(shifts.mass)
+        soft = ca.MX(target)
+        soft[diagonal] = soft[diagonal] + share * ca.DM(shifts.soft)
+        results = [target, ca.MX(program.sparsity, soft)]
+        self._shifted = ca.Function("firmness", [entries, firm, share], results)
+        if factors:
+            self._solver = ca.Linsol("globalised", "ldl", program.sparsity)
+            self._solver.sfact(ca.DM(program.sparsity, 1.0))
+
+    def shift(self, entries: ca.DM, firm: float, share: float) -> None:
+        self._target, self._matrix = self._shifted(entries, firm, share)
+
+    def negative(self) -> int | None:
+        try:
+            self._solver.nfact(self._matrix)
+        except RuntimeError:
+            return None
+        return int(self._solver.neig(self._matrix))
+
+    def backward(self, b: Array) -> Array:
+        if self._pivoted:
+            return np.array(self._program.linear(self._matrix.nz[:], b)).ravel()
+        return np.array(self._solver.solve(self._matrix, b)).ravel()
+
+    def left(self, x: Array, b: Array) -> Array:
+        return np.array(self._program.left(self._target, x, b)).ravel()
