@@ -1,7 +1,8 @@
 """Accuracy and speed measured: ``python -m benchmarks [NAME ...] [--save]``, from a clone of the repository.
 
-Names are order, loads, size, repeated, derivatives, net, path, motion, steps, code, accuracy, pieces, sweep, import,
-extremes and compared; left out, all are run.  ``--save`` writes what each prints into ``benchmarks/results`` too.
+Names are order, loads, size, repeated, whole, derivatives, net, path, motion, steps, code, accuracy, pieces, sweep,
+import, extremes and compared; left out, all are run.  ``--save`` writes what each prints into ``benchmarks/results``,
+too.
 
 Others, ``random``, ``jitter``, ``contact``, ``members``, ``ways`` and ``heap``, stand alone, take options (``--help``)
 and half an hour each.
@@ -32,7 +33,7 @@ from .motion import motion, step_cost
 from .pieces import pieces
 from .random_run import random_scenes
 from .saving import saved
-from .speed import loads, net, order, path, repeated, size
+from .speed import loads, net, order, path, repeated, size, whole
 from .ways import ways
 
 __all__ = ["main"]
@@ -44,7 +45,14 @@ Benchmark = Callable[[], Mapping[str, Any] | None]
 def main(words: list[str]) -> None:
     """Run the benchmarks of these names, all by default; with ``--save`` among the words save their results."""
     known: dict[str, Benchmark] = {"order": order, "loads": loads, "size": size}
-    known |= {"repeated": repeated, "derivatives": derivatives, "net": net, "path": path, "motion": motion}
+    known |= {
+        "repeated": repeated,
+        "whole": whole,
+        "derivatives": derivatives,
+        "net": net,
+        "path": path,
+        "motion": motion,
+    }
     known |= {"steps": step_cost, "code": code, "accuracy": knob, "pieces": pieces, "sweep": many}
     known |= {"import": importing, "extremes": extremes, "compared": compared}
     alone: dict[str, Callable[[list[str]], None]] = {"random": random_scenes, "jitter": jitter}

@@ -1,14 +1,17 @@
-"""Speed of equilibria and paths: order, loads, size, repeated, net, path; part of ``python -m benchmarks``."""
+"""Speed of equilibria and paths: order, loads, size, repeated, whole, net, path; part of ``python -m benchmarks``."""
 
 from __future__ import annotations
 
 import multiprocessing
+import os
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from sfetcas import load
+from sfetcas import solve as solve_any
 from sfetcas.description.scene import Analysis, Scene
 from sfetcas.description.sections import CrossSection
 from sfetcas.equilibria.statics import Settings, solve, solve_model
@@ -22,7 +25,7 @@ from .saving import head, row
 from .scenes import arch, bend, cantilever, large, lee_frame, on_slider, rolled
 from .timing import least
 
-__all__ = ["TIP", "loads", "net", "order", "path", "repeated", "size"]
+__all__ = ["TIP", "loads", "net", "order", "path", "repeated", "size", "whole"]
 
 TIP = np.array([0.445004402246249, 0.810609024880296])
 """Tip of the cantilever under F L^2/EI = 10, elliptic integrals."""
@@ -121,7 +124,7 @@ def repeated() -> None:
         "S3b": (rolled(5), 6, 10),
         "S4": (on_slider(), 4, 2),
     }
-    for kernels in ("interpreted", "compiled"):
+    for kernels in ("core", "interpreted", "compiled"):
         for name, (scene, p, n) in cases.items():
             begin = time.perf_counter()
             prepared = Prepared(assemble(scene, uniform_mesh(scene, p, n)), kernels=kernels)
@@ -132,6 +135,48 @@ def repeated() -> None:
             exact = solve(scene, accuracy=1e-10).last
             error = max(float(np.abs(step.position(k) - exact.position(k)).max()) for k in scene.nodes) / scene.size
             row(name, kernels, f"{error:.1e}", f"{1e3 * first:.1f}", f"{1e3 * cold:.2f}", f"{1e3 * warm:.2f}")
+
+
+def whole() -> None:
+    """Whole runs, with branch, mesh, error estimate and certificate, by the core and without it."""
+    print("Whole runs at an accuracy of 1e-6, each after two that are not counted; processor time, medians of fifteen")
+    print("(paths and contact: five), in milliseconds. With and without the core in turns, in one process.\n")
+    head("problem", "solver", "core", "without", "ratio")
+    folder = Path(__file__).parent.parent / "problems"
+    cantilever_, bend_, portal = (load(folder / f"{name}.toml") for name in ("cantilever_tip_force", *WHOLE))
+    statics = {
+        "cantilever, F L²/EI = 10": cantilever_.replace({"analysis.steps": [10.0], "analysis.accuracy": 1e-6}),
+        "45 degree bend": bend_.replace({"analysis.steps": bend_.analysis.steps[-1:], "analysis.accuracy": 1e-6}),
+        "portal frame": portal.replace({"analysis.steps": [5.0], "analysis.accuracy": 1e-6}),
+    }
+    for name, scene in statics.items():
+        for solver in ("ipopt", "newton"):
+            _whole(name, scene, solver, 15)
+    lee = load(folder / "lee_frame.toml").replace({"analysis.accuracy": 1e-6})
+    _whole("path of Lee's frame", lee, "ipopt", 5)
+    _whole("heavy cantilever on a floor", load(folder / "floor_heavy_cantilever.toml"), "ipopt", 5)
+
+
+WHOLE = ("bend_45_degrees", "portal_frame")
+"""Problems that are solved as a whole beside the cantilever."""
+
+
+def _whole(name: str, scene: Scene, solver: str, runs: int) -> None:
+    spent: dict[str, list[float]] = {"on": [], "off": []}
+    before = os.environ.get("SFETCAS_CORE")
+    try:
+        for _ in range(runs + 2):
+            for core, found in spent.items():
+                os.environ["SFETCAS_CORE"] = core
+                begin = time.process_time()
+                solve_any(scene, solver=solver)
+                found.append(time.process_time() - begin)
+    finally:
+        os.environ.pop("SFETCAS_CORE")
+        if before is not None:
+            os.environ["SFETCAS_CORE"] = before
+    by_core, without = (1e3 * float(np.median(found[2:])) for found in spent.values())
+    row(name, solver, f"{by_core:.1f}", f"{without:.1f}", f"{without / by_core:.1f}")
 
 
 def net() -> None:

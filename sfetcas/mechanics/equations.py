@@ -469,9 +469,12 @@ class Equations:
             beside -= self._of_moments(loading.further)
         if loading.torque.any():
             beside -= self._of_torque(loading.torque)
-        beside[self.rotation_unknowns : self.unknowns] -= positions.Y.T @ force
+        if self.displacement_unknowns:
+            beside[self.rotation_unknowns : self.unknowns] -= positions.Y.T @ force
         pull = loading.pull - self._hanging_pulls(loading)[self._owner][:, None, :]
-        parts = [pull, *loading.loads, positions.B @ loading.shift, positions.BZ @ loading.shift, beside]
+        shift = loading.shift
+        shifts = (positions.B @ shift, positions.BZ @ shift) if shift.any() else (shift, np.zeros(len(positions.rows)))
+        parts = [pull, *loading.loads, *shifts, beside]
         given = np.concatenate([part.ravel() for part in (*parts, force)])
         self._given = [(loading, given), *self._given[:1]]
         return given

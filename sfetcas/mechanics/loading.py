@@ -6,7 +6,8 @@ moved to its first node; the internal force that they cause in the elements befo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import functools
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -88,8 +89,32 @@ class Loading:
 
     def scaled(self, factor: float) -> Loading:
         """All loads and prescribed motions times a factor."""
-        parts = {name: factor * getattr(self, name) for name in (*LOADS, *MOTIONS, "factor")}
-        return replace(self, **parts, loads=tuple(factor * load for load in self.loads))
+        return self if factor == 1.0 else Loading.combined([(self, factor)])
+
+    @staticmethod
+    def combined(parts: Sequence[tuple[Loading, float]]) -> Loading:
+        """The sum of loadings, each times a factor."""
+        first, found = parts[0][0], dict[str, Any]()
+        # What is zero is left out: of most loadings all but one or two parts.
+        for name in (*LOADS, *MOTIONS):
+            terms = [factor * getattr(one, name) for one, factor in parts if name in one._parts]
+            found[name] = sum(terms[1:], terms[0]) if terms else getattr(first, name)
+        loads = list[Array]()
+        for i, load in enumerate(first.loads):
+            terms = [factor * one.loads[i] for one, factor in parts if i in one._loaded]
+            loads.append(sum(terms[1:], terms[0]) if terms else load)
+        total = sum(factor * one.factor for one, factor in parts)
+        return replace(first, **found, loads=tuple(loads), factor=total)
+
+    @functools.cached_property
+    def _parts(self) -> frozenset[str]:
+        """Names of the parts that are not zero."""
+        return frozenset(name for name in (*LOADS, *MOTIONS) if getattr(self, name).any())
+
+    @functools.cached_property
+    def _loaded(self) -> frozenset[int]:
+        """Numbers of the groups of connections whose loads are not zero."""
+        return frozenset(i for i, load in enumerate(self.loads) if load.any())
 
     def unloaded(self) -> Loading:
         """The prescribed motions without the loads; driven joints are motions."""
@@ -101,8 +126,7 @@ class Loading:
 
     def plus(self, other: Loading) -> Loading:
         """The sum of two loadings."""
-        parts = {name: getattr(self, name) + getattr(other, name) for name in (*LOADS, *MOTIONS, "factor")}
-        return replace(self, **parts, loads=tuple(a + b for a, b in zip(self.loads, other.loads, strict=True)))
+        return Loading.combined([(self, 1.0), (other, 1.0)])
 
     def of(self, chosen: Callable[[Term], bool]) -> float:
         """Largest load of the groups whose kind ``chosen`` accepts, dimensionless."""

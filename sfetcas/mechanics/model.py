@@ -289,12 +289,8 @@ class Model:
 
     def loading(self, factor: float, share: float = 1.0) -> Loading:
         """Loads and prescribed motions at a load factor, multiplied by ``share``; dimensionless."""
-        parts = [self.groups[name].scaled(share * value) for name, value in self.factors(factor).items()]
-        total = parts[0]
-        parts += [loading.scaled(share) for loading in self.standing]
-        for part in parts[1:]:
-            total = total.plus(part)
-        return total
+        parts = [(self.groups[name], share * value) for name, value in self.factors(factor).items()]
+        return Loading.combined([*parts, *((loading, share) for loading in self.standing)])
 
     def motion(self, name: str) -> Loading:
         """The prescribed displacements and rotations of one motion at factor 1, dimensionless."""

@@ -125,6 +125,8 @@ class Unwrapping:
 
     def of_vectors(self, turn: Array) -> Array:
         """The angles (n,), rad, where each rotation is by a vector ``turn`` (rotations, 3) about its fixed axis."""
+        if not self.count:
+            return np.zeros(0)
         turn = np.vstack([turn, np.zeros(3)])
         apart = turn[self.sides[:, 1]] - turn[self.sides[:, 0]]
         return np.asarray(np.sign(_dot(self.axis, apart)) * np.linalg.norm(apart, axis=1))

@@ -13,12 +13,14 @@ Neither the order of a scene file, nor axes or units, nor rounding change what i
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterator
 
 import numpy as np
 
 from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index, first_of_largest
+from ..mathematics.keeping import kept
 from ..mechanics.equations import Equations
 from ..mechanics.rotations import RotationFreedom
 
@@ -51,41 +53,42 @@ class Sides:
         self._equations = equations
         self._travels = slice(equations.rotation_unknowns, equations.unknowns) if travels is None else travels
 
-    @functools.cached_property
-    def fields(self) -> tuple[Array, ...]:
+    @property
+    def fields(self) -> Iterator[Array]:
         """The reference fields of rotations in the order of their use, each (rotation unknowns,), rad."""
+        # The first one nearly always decides.
+        for axis in (2, 1, 0) if self._equations.model.space else (2,):
+            for decay in DECAYS:
+                yield self._field(axis, decay)
+
+    @kept(16)
+    def _field(self, axis: int, decay: float) -> Array:
+        """The field about a section axis that fades along each member."""
         equations, model = self._equations, self._equations.model
         lines = model.scene.center_lines
-        about = (
-            np.flatnonzero(model.rotations.kind == RotationFreedom.AXIS) if model.space else np.zeros(0, dtype=np.intp)
-        )
-        found = []
-        for axis in (2, 1, 0) if model.space else (2,):
-            for decay in DECAYS:
-                vectors, shares = np.zeros((len(model.rotations.kind), 3)), np.zeros(len(model.rotations.kind))
-                for place, name in enumerate(sorted(model.rotations.ends)):
-                    ends = list(model.rotations.ends[name])
-                    chain = model.chain(name) if name in model.members else np.array(ends)
-                    along = model.along(name) if name in model.members else np.linspace(0.0, 1.0, len(ends))
-                    frame = quaternion.matrix(lines[name].quaternions(np.array([0.0])))[0]
-                    way = frame[:, axis] if model.space else np.array([0.0, 0.0, 1.0])
-                    # At a node of several members the mean, weighted by the length that the node stands for in each:
-                    # integrals are then the same on all meshes, also of a field that jumps there.
-                    share = (
-                        np.gradient(along) * lines[name].length * (1.0 if name in model.members else WITHOUT_ELEMENTS)
-                    )
-                    vectors[chain] += (share * np.exp(-decay * along))[:, None] * way / (1.0 + place)
-                    shares[chain] += share
-                vectors /= np.where(shares > 0.0, shares, 1.0)[:, None]
-                values = vectors if model.space else vectors[:, 2:3]
-                if len(about):
-                    values = values.copy()
-                    values[about, 0] = (vectors[about] * model.rotations.axis[about]).sum(axis=1)
-                field = np.zeros(equations.rotation_unknowns)
-                used = equations.number >= 0
-                field[equations.number[used]] = values[used]
-                found.append(field)
-        return tuple(found)
+        about = np.flatnonzero(model.rotations.kind == RotationFreedom.AXIS) if model.space else ()
+        vectors, shares = np.zeros((len(model.rotations.kind), 3)), np.zeros(len(model.rotations.kind))
+        way = np.array([0.0, 0.0, 1.0])
+        for place, name in enumerate(sorted(model.rotations.ends)):
+            ends = list(model.rotations.ends[name])
+            chain = model.chain(name) if name in model.members else np.array(ends)
+            along = model.along(name) if name in model.members else np.linspace(0.0, 1.0, len(ends))
+            if model.space:
+                way = quaternion.matrix(lines[name].quaternions(np.array([0.0])))[0][:, axis]
+            # At a node of several members the mean, weighted by the length that the node stands for in each:
+            # integrals are then the same on all meshes, also of a field that jumps there.
+            share = np.gradient(along) * lines[name].length * (1.0 if name in model.members else WITHOUT_ELEMENTS)
+            vectors[chain] += (share * np.exp(-decay * along))[:, None] * way / (1.0 + place)
+            shares[chain] += share
+        vectors /= np.where(shares > 0.0, shares, 1.0)[:, None]
+        values = vectors if model.space else vectors[:, 2:3]
+        if len(about):
+            values = values.copy()
+            values[about, 0] = (vectors[about] * model.rotations.axis[about]).sum(axis=1)
+        field = np.zeros(equations.rotation_unknowns)
+        used = equations.number >= 0
+        field[equations.number[used]] = values[used]
+        return field
 
     @functools.cached_property
     def displacing(self) -> tuple[Array, ...]:

@@ -147,6 +147,8 @@ class StabilityTest:
     def _rows(self, point: Point) -> Array:
         """Weighted Jacobian (rows, n) of the independent closings, displacements without stiffness eliminated."""
         equations = self.equations
+        if not equations.rows:
+            return np.zeros((0, self._n))
         rows = np.zeros((equations.rows, self._n))
         rows[equations.row[self._in_a] - equations.unknowns, self._a_column] = point.entries[self._in_a]
         return (independent(equations, point, self._combine).T @ rows) / np.sqrt(self._weights)
