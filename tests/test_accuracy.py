@@ -156,7 +156,7 @@ def test_accuracy_of_a_quantity_is_refused_where_it_has_no_meaning():
 
 
 def test_kernels_of_another_name_are_refused():
-    with pytest.raises(SceneError, match="kernels: found 'fast', accepted: auto, compiled, interpreted"):
+    with pytest.raises(SceneError, match="kernels: found 'fast', accepted: auto, core, compiled, interpreted"):
         Settings(kernels="fast")
 
 

@@ -270,6 +270,27 @@ def test_numbers_that_are_none_do_not_converge():
         assert not found.converged
 
 
+@pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
+def test_no_state_is_solved_that_is_none():
+    """Random states, some with what is no number, under loads of any size: what converges is finite."""
+    rng, converged = np.random.default_rng(4), 0
+    for name in ("arch", "hinged_space", "linked", "linked_space"):
+        prepared = Prepared(model_of(EVERYTHING[name](), 2, 2))
+        equations = prepared.equations
+        for count in range(60):
+            loading = prepared.model.loading([0.0, 0.3, -5.0, 1e3, 1e300, np.nan, np.inf][count % 7])
+            _, state, step = trial(equations, prepared.model, size=10.0 ** rng.integers(-6, 3))
+            state = equations.moved(state, step)
+            if count % 4 == 0:
+                q = state.q.copy()
+                q.flat[rng.integers(q.size)] = rng.choice([np.nan, np.inf, 1e308])
+                state = replace(state, q=q)
+            found = newton.correct(newton.AtLoads(equations, loading, prepared.weight), state)
+            converged += found.converged
+            assert not found.converged or all(np.isfinite(part).all() for part in vars(found.state).values())
+    assert converged > 20
+
+
 # -- libraries ------------------------------------------------------------------------------------------------
 
 

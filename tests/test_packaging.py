@@ -12,6 +12,7 @@ import pytest
 
 import sfetcas
 from sfetcas.cli import main
+from sfetcas.core import building
 
 ROOT = Path(__file__).parent.parent
 
@@ -35,6 +36,27 @@ def test_wheel_holds_the_package_alone(built):
     assert {"sfetcas/py.typed", "sfetcas/mechanics/model.py"} <= set(names)
     assert not [name for name in names if "benchmark" in name]
     assert "sfetcas = sfetcas.cli:main" in commands
+
+
+def test_wheel_is_one_of_a_platform_where_there_is_a_compiler(built):
+    with zipfile.ZipFile(built[0]) as archive:
+        libraries = [name for name in archive.namelist() if name.endswith(".so")]
+    if building.compiler() is None:
+        assert built[0].name.endswith("-py3-none-any.whl")
+        assert not libraries
+    else:
+        assert not built[0].name.endswith("-any.whl")
+        (library,) = libraries
+        assert library.startswith(f"sfetcas/core/{building.prefix()}")
+
+
+def test_wheel_without_the_core_is_for_every_machine(tmp_path, monkeypatch):
+    wheels = pytest.importorskip("hatchling.builders.wheel")
+    monkeypatch.setenv("SFETCAS_CORE", "off")
+    (wheel,) = wheels.WheelBuilder(str(ROOT)).build(directory=str(tmp_path))
+    assert wheel.endswith("-py3-none-any.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        assert not [name for name in archive.namelist() if name.endswith(".so")]
 
 
 def test_source_distribution_holds_what_tests_and_documentation_need(built):

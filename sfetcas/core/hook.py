@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import runpy
 import sysconfig
 from pathlib import Path
@@ -16,8 +17,8 @@ class CoreHook(BuildHookInterface[Any]):
     """Compiles the core; a wheel with it is one of a platform, one without is for all."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Put the library beside its sources; without a compiler it is left out."""
-        if self.target_name != "wheel":
+        """Put the library beside its sources; without a compiler, and with ``$SFETCAS_CORE=off``, it is left out."""
+        if self.target_name != "wheel" or os.environ.get("SFETCAS_CORE") == "off":
             return
         # The package itself cannot be imported: what it needs is not installed yet.
         building = runpy.run_path(str(Path(__file__).with_name("building.py")))
