@@ -169,6 +169,9 @@ SLACK = 1e-6
 def redundant(equations: Equations, point: Point) -> bool:
     """Whether rows were redundant at the first state or at any equilibrium so far; kept in ``equations.redundant``."""
     if equations.redundant is None:
+        if not np.isfinite(point.entries).all():
+            # Of what is no number nothing is found out; Newton's method ends there.
+            return False
         equations.redundant = bool(loose_rows(equations, point).size)
     return equations.redundant
 
