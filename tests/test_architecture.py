@@ -26,7 +26,6 @@ ORDER = [
     "tolerances",
     "core",
     "core.building",
-    "core.hook",
     "mathematics",
     "mathematics.arrays",
     "mathematics.active",

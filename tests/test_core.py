@@ -298,7 +298,7 @@ def test_no_state_is_solved_that_is_none():
 def apart(tmp_path, monkeypatch):
     """The sources alone in a folder, another one as cache."""
     sources = tmp_path / "core"
-    shutil.copytree(building.SOURCES, sources, ignore=shutil.ignore_patterns("*.so", "__pycache__"))
+    shutil.copytree(building.SOURCES, sources, ignore=shutil.ignore_patterns(f"*{building.SUFFIX}", "__pycache__"))
     monkeypatch.setattr(building, "SOURCES", sources)
     monkeypatch.setattr(c, "SOURCES", sources)
     monkeypatch.setenv("SFETCAS_CACHE", str(tmp_path / "cache"))
@@ -315,7 +315,7 @@ def compiler():
 
 
 def made(cache):
-    return sorted(path.name for path in cache.glob("core-*.so"))
+    return sorted(path.name for path in cache.glob(f"core-*{building.SUFFIX}"))
 
 
 def test_a_core_that_is_missing_is_compiled_once(apart, compiler, monkeypatch):

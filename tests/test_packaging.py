@@ -40,7 +40,7 @@ def test_wheel_holds_the_package_alone(built):
 
 def test_wheel_is_one_of_a_platform_where_there_is_a_compiler(built):
     with zipfile.ZipFile(built[0]) as archive:
-        libraries = [name for name in archive.namelist() if name.endswith(".so")]
+        libraries = [name for name in archive.namelist() if name.endswith(building.SUFFIX)]
     if building.compiler() is None:
         assert built[0].name.endswith("-py3-none-any.whl")
         assert not libraries
@@ -56,13 +56,21 @@ def test_wheel_without_the_core_is_for_every_machine(tmp_path, monkeypatch):
     (wheel,) = wheels.WheelBuilder(str(ROOT)).build(directory=str(tmp_path))
     assert wheel.endswith("-py3-none-any.whl")
     with zipfile.ZipFile(wheel) as archive:
-        assert not [name for name in archive.namelist() if name.endswith(".so")]
+        assert not [name for name in archive.namelist() if name.endswith(building.SUFFIX)]
 
 
 def test_source_distribution_holds_what_tests_and_documentation_need(built):
     with tarfile.open(built[1]) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
-    needed = {"LICENSE", "README.md", "CITATION.cff", "docs/conf.py", "tests/test_packaging.py", "pyproject.toml"}
+    needed = {
+        ".ci/hatch_build.py",
+        "LICENSE",
+        "README.md",
+        "CITATION.cff",
+        "docs/conf.py",
+        "tests/test_packaging.py",
+        "pyproject.toml",
+    }
     assert needed | {"problems/lee_frame.toml", "benchmarks/scenes.py"} <= names
     # What is made from the program is made anew.
     assert not {name for name in names if name.startswith(("docs/gallery", "docs/reference/api"))}

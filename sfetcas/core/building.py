@@ -15,7 +15,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-__all__ = ["SOURCES", "compile_core", "named", "prefix", "whole"]
+__all__ = ["FLAGS", "SOURCES", "SUFFIX", "compile_core", "named", "prefix", "whole"]
 
 SOURCES = Path(__file__).parent
 """Folder of the sources; ``core.c`` includes all others."""
@@ -23,6 +23,9 @@ SOURCES = Path(__file__).parent
 FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-shared")
 """No operations are fused, whatever the processor has: answers have the same bits everywhere."""
 
+
+SUFFIX = ".library"
+"""End of the name of a library: it is no module that Python could import."""
 
 LARGEST = 10_000_000
 """Bytes of a library that is looked at; the core has less than a hundred thousand."""
@@ -43,12 +46,12 @@ def prefix() -> str:
 
 def named(beginning: str, library: bytes) -> str:
     """Name of a library with its checksum."""
-    return f"{beginning}{hashlib.sha256(library).hexdigest()[:32]}.so"
+    return f"{beginning}{hashlib.sha256(library).hexdigest()[:32]}{SUFFIX}"
 
 
 def whole(folder: Path, beginning: str) -> Path | None:
     """A library in a folder whose name begins so and which holds what its name says; None where there is none."""
-    for path in sorted(folder.glob(f"{beginning}*.so")):
+    for path in sorted(folder.glob(f"{beginning}*{SUFFIX}")):
         if path.is_file() and path.stat().st_size <= LARGEST and named(beginning, path.read_bytes()) == path.name:
             return path
     return None
@@ -61,7 +64,7 @@ def compile_core(folder: Path) -> Path | None:
         return None
     try:
         with tempfile.TemporaryDirectory(dir=folder) as place:
-            made = Path(place) / "library.so"
+            made = Path(place) / "made"
             call = [command, *FLAGS, "-o", str(made), str(SOURCES / "core.c"), "-lm"]
             subprocess.run(call, check=True, capture_output=True, env={**os.environ, "TMPDIR": place})
             found = folder / named(prefix(), made.read_bytes())

@@ -21,10 +21,10 @@ class CoreHook(BuildHookInterface[Any]):
         if self.target_name != "wheel" or os.environ.get("SFETCAS_CORE") == "off":
             return
         # The package itself cannot be imported: what it needs is not installed yet.
-        building = runpy.run_path(str(Path(__file__).with_name("building.py")))
-        folder = Path(__file__).parent
+        folder = Path(self.root) / "sfetcas" / "core"
+        building = runpy.run_path(str(folder / "building.py"))
         beginning = building["prefix"]()
-        for old in folder.glob("core-*.so"):
+        for old in folder.glob(f"core-*{building['SUFFIX']}"):
             if not old.name.startswith(beginning):
                 old.unlink()
         found = building["whole"](folder, beginning) or building["compile_core"](folder)
