@@ -21,6 +21,7 @@ from .kernels import Batch
 
 __all__ = [
     "NO_ROOM",
+    "CoreFactors",
     "CoreSystem",
     "InertiaSolver",
     "Product",
