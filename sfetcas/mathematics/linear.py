@@ -167,17 +167,21 @@ class SparseSolver:
         Number of multipliers of constraints, the last unknowns, with zero or negative diagonal.
     symmetric : bool
         Whether the matrices are symmetric.
+    pivoted : bool
+        Whether the core uses pivoting at once.
 
     Source: Vanderbei 1995 (symmetric quasidefinite matrices have factors in any order).
     """
 
-    def __init__(self, n: int, row: Array, column: Array, rows: int = 0, *, symmetric: bool = True) -> None:
+    def __init__(
+        self, n: int, row: Array, column: Array, rows: int = 0, *, symmetric: bool = True, pivoted: bool = False
+    ) -> None:
         self.n, self._row, self._column = n, row, column
         self._small, self._few, self._symmetric = n <= DENSE, rows <= FEW_ROWS, symmetric
         self._rows, self._lost = rows, 0
         self._sides = np.repeat([tolerances.SOFT, -tolerances.SOFT], [n - rows, rows])
         self._filled = Filled(row, column, symmetric=symmetric)
-        self._core = core()
+        self._core, self._pivoted = core(), pivoted
 
     def factor(self, entries: Array) -> None:
         """Set the entries of the matrix; it is factorised by the next :meth:`solve`."""
@@ -193,7 +197,15 @@ class SparseSolver:
     def _system(self) -> CoreSystem:
         assert self._core is not None
         last = self._rows if self._few else 0
-        return CoreSystem(self._core, self.n, self._filled.row, self._filled.column, self._sides, last, self._symmetric)
+        return CoreSystem(
+            self._core,
+            self.n,
+            self._filled.row,
+            self._filled.column,
+            self._sides,
+            last,
+            self._symmetric and not self._pivoted,
+        )
 
     @property
     def of_core(self) -> CoreSystem | None:

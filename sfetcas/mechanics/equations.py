@@ -628,7 +628,10 @@ class Equations:
     def solver(self) -> SparseSolver:
         """Sparse solver for the Newton matrix."""
         symmetric = self.model.has_potential
-        return SparseSolver(self.total, self.row, self.column, self.rows, symmetric=symmetric)
+        # What lies without a force has none to rounding only with pivots: softness leaves some.
+        return SparseSolver(
+            self.total, self.row, self.column, self.rows, symmetric=symmetric, pivoted=bool(self.model.mesh.points)
+        )
 
     def regularised(self, entries: Array, primal: Array, dual: float) -> Array:
         """Entries of the Newton matrix with a primal and a dual regularisation on its diagonal.
