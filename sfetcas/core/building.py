@@ -15,7 +15,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-__all__ = ["FLAGS", "SOURCES", "SUFFIX", "compile_core", "named", "prefix", "whole"]
+__all__ = ["FLAGS", "SOURCES", "SUFFIX", "compile_core", "compiler", "named", "prefix", "whole"]
 
 SOURCES = Path(__file__).parent
 """Folder of the sources; ``core.c`` includes all others."""
@@ -44,9 +44,9 @@ def prefix() -> str:
     return f"core-{content.hexdigest()[:24]}-"
 
 
-def named(beginning: str, library: bytes) -> str:
+def named(beginning: str, library: bytes, suffix: str = SUFFIX) -> str:
     """Name of a library with its checksum."""
-    return f"{beginning}{hashlib.sha256(library).hexdigest()[:32]}{SUFFIX}"
+    return f"{beginning}{hashlib.sha256(library).hexdigest()[:32]}{suffix}"
 
 
 def whole(folder: Path, beginning: str) -> Path | None:

@@ -64,12 +64,11 @@ static int sf_reduced(double x, double *rest, double *below) {
   return (int)(k - 4.0 * floor(0.25 * k));
 }
 
-static double sf_sin(double x) {
+/* The sine of an angle and a number of quarters of a turn. */
+static double sf_sine(double x, int ahead) {
   double rest, below;
-  int quarter;
   if (!(x - x == 0.0)) return NAN;
-  quarter = sf_reduced(x, &rest, &below);
-  switch (quarter) {
+  switch ((sf_reduced(x, &rest, &below) + ahead) % 4) {
     case 0: return sf_series_sin(rest, below);
     case 1: return sf_series_cos(rest, below);
     case 2: return -sf_series_sin(rest, below);
@@ -77,18 +76,9 @@ static double sf_sin(double x) {
   }
 }
 
-static double sf_cos(double x) {
-  double rest, below;
-  int quarter;
-  if (!(x - x == 0.0)) return NAN;
-  quarter = sf_reduced(x, &rest, &below);
-  switch (quarter) {
-    case 0: return sf_series_cos(rest, below);
-    case 1: return -sf_series_sin(rest, below);
-    case 2: return -sf_series_cos(rest, below);
-    default: return sf_series_sin(rest, below);
-  }
-}
+static double sf_sin(double x) { return sf_sine(x, 0); }
+
+static double sf_cos(double x) { return sf_sine(x, 1); }
 
 static double sf_tan(double x) { return sf_sin(x) / sf_cos(x); }
 

@@ -16,7 +16,6 @@ import functools
 import hashlib
 import os
 import platform
-import shutil
 import stat
 import subprocess
 import tempfile
@@ -28,11 +27,12 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
+from ..core.building import compiler, named
 from ..files import UnreadableError, read_file
 from .arrays import Array
 from .source import loadable
 
-__all__ = ["LARGEST", "Batch", "Kernels", "cache_folder", "chosen", "compiled", "interpreted", "private"]
+__all__ = ["Batch", "Kernels", "cache_folder", "chosen", "compiled", "interpreted", "private"]
 
 Kernels = Literal["auto", "core", "compiled", "interpreted"]
 """How equations are evaluated: by the core, or in Python with functions of elements compiled or interpreted."""
@@ -82,7 +82,7 @@ def cache_folder() -> Path | None:
 
 @functools.cache
 def _compiler() -> str | None:
-    return shutil.which(os.environ.get("CC") or "cc") or shutil.which("gcc")
+    return compiler()
 
 
 def _flags(function: ca.Function) -> tuple[str, ...]:
@@ -98,7 +98,7 @@ def _key(function: ca.Function) -> str:
 
 def _named(key: str, library: bytes) -> str:
     """Name of a library with its checksum."""
-    return f"{key}{hashlib.sha256(library).hexdigest()[:32]}.so"
+    return named(key, library, ".so")
 
 
 def private(folder: Path) -> bool:
@@ -148,8 +148,8 @@ def compiled(function: ca.Function) -> ca.Function:
 
 def _compile(function: ca.Function, place: Path | None) -> bool:
     """Put the library of a function into the cache; whether that went well."""
-    compiler = _compiler()
-    if compiler is None or place is None:
+    program = _compiler()
+    if program is None or place is None:
         return False
     try:
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -158,7 +158,7 @@ def _compile(function: ca.Function, place: Path | None) -> bool:
         with tempfile.TemporaryDirectory(dir=place) as folder:
             source, library = Path(folder) / f"{function.name()}.c", Path(folder) / "library.so"
             source.write_text(loadable(function))
-            command = [compiler, *_flags(function), "-o", str(library), str(source), "-lm"]
+            command = [program, *_flags(function), "-o", str(library), str(source), "-lm"]
             # What the compiler itself leaves where it is interrupted goes with the folder.
             subprocess.run(command, check=True, capture_output=True, env={**os.environ, "TMPDIR": folder})
             os.replace(library, place / _named(_key(function), library.read_bytes()))

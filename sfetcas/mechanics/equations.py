@@ -322,6 +322,10 @@ class Equations:
             (self.model.positions.E.T @ loading.force.ravel()).reshape(len(self._first), self.model.element.axes)
         )
 
+    def _loaded_pulls(self, loading: Loading) -> Array:
+        """Minus the internal forces (elements, points, axes) that loads cause."""
+        return np.asarray(loading.pull - self._hanging_pulls(loading)[self._owner][:, None, :])
+
     def displacements(self, state: State, loading: Loading, gained: Array) -> tuple[Array, Array]:
         """Displacements of the places (places * axes,) and gaps of the loop closures (closings,), dimensionless.
 
@@ -353,7 +357,7 @@ class Equations:
             parts = self._core.evaluate(_arrays(state), self.given(loading))
             return _Results(parts, self._core.places, self._core.pull)
         places = self.retained_places(state, loading)
-        pull = loading.pull - self._hanging_pulls(loading)[self._owner][:, None, :]
+        pull = self._loaded_pulls(loading)
         constant = self._closing_pulls(state.lam)[self._owner]
         found = [
             group(state, places, pull if number == 0 else loading.loads[number - 1], constant)
@@ -471,7 +475,7 @@ class Equations:
             beside -= self._of_torque(loading.torque)
         if self.displacement_unknowns:
             beside[self.rotation_unknowns : self.unknowns] -= positions.Y.T @ force
-        pull = loading.pull - self._hanging_pulls(loading)[self._owner][:, None, :]
+        pull = self._loaded_pulls(loading)
         shift = loading.shift
         shifts = (positions.B @ shift, positions.BZ @ shift) if shift.any() else (shift, np.zeros(len(positions.rows)))
         parts = [pull, *loading.loads, *shifts, beside]
@@ -505,7 +509,7 @@ class Equations:
         """Entries of the Newton matrix with the positive matrices of elements of :attr:`.Element.convex`."""
         parts = [[*part] for part in self._evaluated(state, loading).groups]
         if len(parts[0][4]):
-            pull = loading.pull - self._hanging_pulls(loading)[self._owner][:, None, :]
+            pull = self._loaded_pulls(loading)
             constant = self._closing_pulls(state.lam)[self._owner]
             places = self.retained_places(state, loading)
             parts[0][4] = self._convex(state.q, places, state.unwrapped, pull, constant)[0]
