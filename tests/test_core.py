@@ -21,6 +21,7 @@ from sfetcas.mathematics import core as c
 from sfetcas.mathematics import linear, tapes
 from sfetcas.mathematics.linear import CoreSystem, InertiaSolver, SparseSolver
 from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.mesh import first_mesh
 from sfetcas.mechanics.terms import rotation_gradient
 from sfetcas.solvers import newton
 from sfetcas.solvers.prepared import Prepared
@@ -77,6 +78,15 @@ def test_equations_are_those_of_python(name, assembly, gauss):
             alike(getattr(mine, part), getattr(other, part))
     for mine, other in zip(by_core.shares(states[1], loading), python.shares(states[1], loading), strict=True):
         alike(mine, other)
+
+
+@pytest.mark.parametrize("name", ["spatial_fourbar", "spatial_loop_hinge"])
+def test_scales_of_hinges_about_any_axis(name):
+    """The components of a moment have weights of both signs in the angle about an axis aslant; sizes add up."""
+    scene = sfetcas.load(PROBLEMS / f"{name}.toml")
+    by_core, python = both(sfetcas.assemble(scene, first_mesh(scene, 4, turning=1.0)))
+    loading, start, _ = trial(python, python.model)
+    alike(by_core.at(start, loading).scale, python.at(start, loading).scale)
 
 
 @pytest.mark.parametrize("name", ["arch", "hinged_space", "linked", "linked_space"])
