@@ -12,11 +12,11 @@ import numpy as np
 
 from sfetcas.description.scene import Load, Member, Node, Scene
 from sfetcas.description.sections import CrossSection
+from sfetcas.processes import cores
 from sfetcas.sweeps.cases import sampled
 from sfetcas.sweeps.distributions import Normal, Uniform
 from sfetcas.sweeps.result import Sweep
 from sfetcas.sweeps.sweeping import sweep
-from sfetcas.sweeps.workers import cores
 from sfetcas.tradeoff.tables import markdown_table
 
 __all__ = ["many"]
@@ -44,11 +44,12 @@ def many() -> None:
     rows = []
     for dimension in ("plane", "space"):
         first: Sweep | None = None
-        for name in ("processes", "Dask"):
+        for name in ("processes", "Dask", "batch", "batch, warm"):
             if name == "Dask" and importlib.util.find_spec("distributed") is None:
                 continue
-            with contextlib.nullcontext() if name == "processes" else _dask() as executor:
-                found = sweep(bar(dimension), cases, QUANTITIES, executor=executor)
+            with _dask() if name == "Dask" else contextlib.nullcontext() as executor:
+                more = {"batch": name.startswith("batch"), "warm": name.endswith("warm")}
+                found = sweep(bar(dimension), cases, QUANTITIES, executor=executor, **more)
             rows.append((dimension, name, *_cells(found, first or found)))
             first = first or found
     heads = ("cantilever", "executor", "s", "s of solves", "ms a solve", "overhead", "numbers")

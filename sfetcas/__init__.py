@@ -119,6 +119,7 @@ if TYPE_CHECKING:
     from .parametric.fitting import fit as fit
     from .parametric.fitting import fitting as fitting
     from .parametric.solving import ParametricAnswer as ParametricAnswer
+    from .parametric.solving import ParametricAnswers as ParametricAnswers
     from .parametric.solving import ParametricEquilibrium as ParametricEquilibrium
     from .parametric.solving import parametric as parametric
     from .paths.path import Branch as Branch
@@ -187,7 +188,7 @@ _PUBLIC = {
     "parametric.changing": "changed",
     "parametric.equilibrium": "EquilibriumSolver",
     "parametric.fitting": "Fit Fitting Measurement fit fitting",
-    "parametric.solving": "ParametricAnswer ParametricEquilibrium parametric",
+    "parametric.solving": "ParametricAnswer ParametricAnswers ParametricEquilibrium parametric",
     "paths.path": "Branch Path PathPoint",
     "paths.paths": "switch",
     "solvers.open_problem": "OpenAnswer OpenProblem equilibrium_nlp",

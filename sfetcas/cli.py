@@ -265,6 +265,18 @@ def _add_sweep(commands: Commands) -> None:
         "--out", type=Path, action="append", default=[], metavar="TABLE", help="write all cases: .csv, .json or .npz"
     )
     many.add_argument("--workers", type=int, metavar="N", help="number of processes (default: that of the processors)")
+    many.add_argument(
+        "--batch",
+        action="store_true",
+        help="solve what is not out of the ordinary together in threads, a hundred times as fast; for statics without "
+        "contact, stops and histories",
+    )
+    many.add_argument(
+        "--warm",
+        action="store_true",
+        help="with --batch begin at the nearest case that was solved before: faster still, but which of several stable "
+        "equilibria is found depends on the order of the cases",
+    )
     _add_settings(many)
 
 
@@ -620,7 +632,16 @@ def _sweep(options: argparse.Namespace) -> int:
     with _counted_progress(len(cases)) as progress:
         found = _named(
             options.file,
-            lambda: sweep(scene, cases, quantities, workers=options.workers, settings=settings, progress=progress),
+            lambda: sweep(
+                scene,
+                cases,
+                quantities,
+                workers=options.workers,
+                settings=settings,
+                progress=progress,
+                batch=options.batch,
+                warm=options.warm,
+            ),
         )
     _give(found, lambda: report_sweep(found), outputs)
     if found.interrupted:
@@ -629,7 +650,7 @@ def _sweep(options: argparse.Namespace) -> int:
     if not found.solved.any():
         print(f"sfetcas: no solution: none of {counted(len(found), 'case')} was solved", file=sys.stderr)
         return NO_SOLUTION
-    return SOLVED if all(outcome.status == "solved" for outcome in found.outcomes) else SHORT
+    return SOLVED if (found.table["status"] == "solved").all() else SHORT
 
 
 @contextlib.contextmanager

@@ -13,7 +13,7 @@ from typing import Any
 
 from .stopping import noted
 
-__all__ = ["begin_apart", "context_of", "postponed"]
+__all__ = ["begin_apart", "context_of", "cores", "postponed"]
 
 SIGNALS = {signal.SIGINT, signal.SIGTERM}
 
@@ -30,6 +30,13 @@ def context_of(preloaded: Sequence[str]) -> Any:
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(list(preloaded))
     return context
+
+
+def cores() -> int:
+    """Number of processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 @contextlib.contextmanager

@@ -357,10 +357,10 @@ def report_sweep(found: Sweep) -> None:
 
 
 def _report_statuses(found: Sweep) -> None:
-    short = sum(outcome.status == "short" for outcome in found.outcomes)
+    short = int((found.table["status"] == "short").sum())
     if short:
         print(f"  {short} of these not to the accuracy asked for")
-    noted = sum(bool(outcome.notes) for outcome in found.outcomes)
+    noted = int((found.table["notes"] != "").sum())
     if noted:
         print(f"  notes with {counted(noted, 'answer')}, see --out")
 

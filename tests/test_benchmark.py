@@ -16,7 +16,7 @@ from sfetcas.checks import check
 from sfetcas.description.scene import Analysis, Expect
 from sfetcas.equilibria.statics import Settings, solve
 from sfetcas.paths.paths import follow_path
-from sfetcas.sweeps.workers import cores
+from sfetcas.processes import cores
 
 
 @pytest.fixture

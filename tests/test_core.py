@@ -12,7 +12,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from scenes import model_of
+from scenes import cantilever, model_of
 from systems import EVERY, EVERYTHING
 
 import sfetcas
@@ -23,7 +23,7 @@ from sfetcas.mathematics.linear import CoreSystem, InertiaSolver, SparseSolver
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.mesh import first_mesh
 from sfetcas.mechanics.terms import rotation_gradient
-from sfetcas.solvers import newton
+from sfetcas.solvers import continuation, newton
 from sfetcas.solvers.prepared import Prepared
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
@@ -143,6 +143,59 @@ def test_newton_takes_the_decisions_of_python(name, monkeypatch):
     monkeypatch.setattr(newton, "_by_core", checked)
     sfetcas.solve(sfetcas.load(PROBLEMS / f"{name}.toml"))
     assert len(compared) > 3 or name == "fourbar_hinges_in_space"
+
+
+FOLLOWED = {
+    "cantilever_tip_force": True,
+    "portal_frame": True,
+    "bend_45_degrees": True,
+    "tendon_robot_along": True,
+    "frame_snaps": False,
+    "column": False,
+}
+"""Whether the core follows all ways to their ends."""
+
+
+@pytest.mark.parametrize("name", FOLLOWED)
+def test_ways_of_loads_are_those_of_python(name, monkeypatch):
+    """The same steps, tried and taken, to the same states, and the end of a way where it is not plain any more."""
+    compared, by_core = [], continuation._Following.plainly
+
+    def checked(self, begin, whole, tries):
+        here, step, left = by_core(self, begin, whole, tries)
+        count = 0
+
+        def counted(point, length):
+            nonlocal count
+            count += 1
+            return self.trial(point, length)
+
+        if here.done > 0.0:
+            # Not by the whole part of the way: where it is left is no multiple of steps.
+            other, reached = continuation.advanced(
+                begin, continuation.FIRST, counted, lambda there: there.done >= here.done, tries=tries
+            )
+            assert reached
+            assert other.done == here.done
+            # At the end of what is plain come the steps that it refused.
+            assert count == tries - left or (here.done < 1.0 and count < tries - left)
+            alike(here.found.state.q, other.found.state.q, 1e-9)
+            alike(here.found.state.lam, other.found.state.lam, 1e-9)
+        if self.proportional:
+            compared.append(here.done)
+        return here, step, left
+
+    monkeypatch.setattr(continuation._Following, "plainly", checked)
+    if name == "frame_snaps":
+        scene = sfetcas.load(PROBLEMS / "lee_frame.toml").replace({"analysis": sfetcas.Analysis(steps=[1.9])})
+    elif name == "column":
+        # Beyond its critical load a straight column is left to its side.
+        scene = sfetcas.Scene.from_dict(cantilever((-3.0, 0.0)))
+    else:
+        scene = sfetcas.load(PROBLEMS / f"{name}.toml")
+    sfetcas.solve(scene.replace({"expect": ()}))
+    assert compared
+    assert (min(compared) == 1.0) == FOLLOWED[name]
 
 
 WITHOUT = ["cantilever_tip_force", "portal_frame", "bend_45_degrees", "tendon_robot_along"]

@@ -458,7 +458,8 @@ def test_what_slides_at_both_ends_goes_as_little_as_it_can():
     whole, half = (solve(roof(one)).last for one in (False, True))
     for node in ("A", "B"):
         np.testing.assert_allclose(whole.position(node), half.position(node), atol=2e-5)
-    np.testing.assert_allclose(whole.position("C") * [-1, 1, 1], whole.position("A"), atol=1e-6)
+    # Along the floor nothing resists: rounding leads it 1e-6 to 6e-6 astray (with other evaluators and accuracies).
+    np.testing.assert_allclose(whole.position("C") * [-1, 1, 1], whole.position("A"), atol=2e-5)
     assert whole.position("A")[0] < -1.001
     np.testing.assert_allclose(whole.contacts["floor"]["friction"], [[0.125, 0, 0], [-0.125, 0, 0]], atol=1e-6)
 

@@ -5,6 +5,7 @@
 #include "states.c"
 #include "factors.c"
 #include "newton.c"
+#include "follow.c"
 
 int sf_version(void) { return SF_VERSION; }
 
@@ -21,6 +22,9 @@ int sf_sizes(int *sizes) {
   sizes[8] = (int)sizeof(sf_limits);
   sizes[9] = (int)sizeof(sf_border);
   sizes[10] = (int)sizeof(sf_report);
-  sizes[11] = SF_OPERATIONS;
+  sizes[11] = (int)sizeof(sf_count_of);
+  sizes[12] = (int)sizeof(sf_way);
+  sizes[13] = (int)sizeof(sf_cases);
+  sizes[14] = SF_OPERATIONS;
   return 0;
 }

@@ -11,7 +11,7 @@
 #ifndef SFETCAS_CORE_H
 #define SFETCAS_CORE_H
 
-#define SF_VERSION 1
+#define SF_VERSION 2
 
 #ifdef _WIN32
 #define SF_PUBLIC __declspec(dllexport)
@@ -200,5 +200,45 @@ SF_PUBLIC int sf_correct_size(const sf_model *model);
 SF_PUBLIC int sf_correct(const sf_model *model, sf_system *system, const double *given, const double *tangent,
                          sf_border *border, const sf_limits *limits, sf_state *state, sf_point *point, double *memory,
                          sf_report *report);
+
+/* ---- loads that grow, and many cases ---------------------------------------------------------------- */
+
+/* How it is told that all eigenvalues are clearly above zero, see sfetcas/solvers/stability.py. */
+typedef struct {
+  const double *weight; /* (total,) of eigenvalues; zero where an unknown has none */
+  double shift, softest, soft, rounding, graded, broken, blurred;
+  int rounds;
+} sf_count_of;
+
+/* A way of loads and motions, and the limits of sfetcas/solvers/continuation.py. */
+typedef struct {
+  const double *begun, *rate; /* (given,) where it begins, NULL: nothing, and by the part of the way */
+  double done, step;          /* changed: the part that is done, the length of the next step */
+  int tries;                  /* changed: steps that may still be tried */
+  double longest, linear, unbalanced, still, shortest, least, brief;
+} sf_way;
+
+/* Cases of one model. */
+typedef struct {
+  int cases, done;          /* done: changed */
+  int groups;               /* of terms with data that vary */
+  const int *count;         /* (groups,) of how many numbers */
+  double *const *datum;     /* (groups,) where the model has them */
+  const double *row, *zero; /* (cases, data and given); the state without loads */
+  const int *near;          /* (cases,) a case before from which each begins, -1: none; or NULL */
+  const double *longest;    /* (cases,) that of the way of each */
+  const double *stiffer;    /* (cases,) by which the shift of eigenvalues is larger */
+  double *state;            /* (cases, numbers of a state) */
+  int *found;               /* (cases,) */
+  double *residual;         /* (cases,) */
+} sf_cases;
+
+SF_PUBLIC int sf_follow_size(const sf_model *model);
+SF_PUBLIC int sf_follow(const sf_model *model, sf_system *system, sf_way *way, const sf_limits *limits,
+                        const sf_count_of *count, const double *tangent, sf_state *state, sf_point *point,
+                        double *memory, sf_report *report);
+SF_PUBLIC int sf_solve_cases(const sf_model *model, sf_system *system, sf_cases *cases, const sf_way *way,
+                             const sf_limits *limits, const sf_limits *near_limits, const sf_count_of *count,
+                             sf_point *point, double *memory);
 
 #endif

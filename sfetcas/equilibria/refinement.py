@@ -31,7 +31,7 @@ from .single import finished, unjudged
 from .solution import Equilibrium, refuse_large
 from .ways import KEPT
 
-__all__ = ["DRIFT", "LEVELS", "MOST_ELEMENTS", "STALLS", "Refinement"]
+__all__ = ["DRIFT", "LEVELS", "MOST_ELEMENTS", "STALLS", "TORN", "Refinement"]
 
 HUGE = 2000
 """From this many elements on the error is estimated from the mesh with half the elements, not with twice."""

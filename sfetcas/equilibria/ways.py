@@ -338,9 +338,10 @@ class Ways:
         low, high = min(begin, end), max(begin, end)
         knots = {t for history in self.scene.histories.values() for t in history.knots if low < t < high}
         stops = [begin, *sorted(knots, reverse=end < begin), end]
+        straight = all(history.interpolation == "linear" for history in self.scene.histories.values())
         found: EquilibriumResult | None = None
         for a, b in zip(stops, stops[1:], strict=False):
-            part = self._followed(pilot, between(pilot.model, a, b), state, (a, b), allowed)
+            part = self._followed(pilot, between(pilot.model, a, b), state, (a, b), allowed, proportional=straight)
             if part is None:
                 return None
             found, state = replace(part, notes=(*(found.notes if found else ()), *part.notes)), part.solved.state
@@ -378,15 +379,18 @@ class Ways:
         state: State,
         factors: tuple[float, float] | None,
         allowed: Allowed | None = None,
+        *,
+        proportional: bool | None = None,
     ) -> EquilibriumResult | None:
         """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""
         switch_branch, energy_known = self.meshes.switch_branch and pilot.switches_branch, pilot.model.minimisable
 
         def refuse(there: Solved) -> None:
-            if self.scene.limited_on_ways:
-                refuse_large(there.fields)
+            refuse_large(there.fields)
 
-        more: dict[str, Any] = {"allowed": allowed, "refuse": refuse, "contraction": self._contraction}
+        more: dict[str, Any] = {"allowed": allowed, "contraction": self._contraction, "proportional": proportional}
+        if self.scene.limited_on_ways:
+            more["refuse"] = refuse
         result = follow(pilot, way, state, switch_branch=switch_branch, **more)
         passed = not result.reached and switch_branch and not energy_known
         if passed:

@@ -23,6 +23,8 @@ from .tapes import NAMES, Tape
 
 __all__ = [
     "Border",
+    "Cases",
+    "Counting",
     "Factors",
     "Group",
     "Limits",
@@ -35,6 +37,7 @@ __all__ = [
     "Sums",
     "System",
     "TapeTable",
+    "Way",
     "core",
     "doubles",
     "integers",
@@ -195,12 +198,45 @@ class Report(ctypes.Structure):
     )
 
 
-HANDED = (TapeTable, Group, Model, Point, Factors, Pivoted, System, Limits, Border, Report)
+class Counting(ctypes.Structure):
+    """``sf_count_of``."""
+
+    _fields_ = (
+        ("weight", _pointer),
+        *((name, _double) for name in ("shift", "softest", "soft", "rounding", "graded", "broken", "blurred")),
+        ("rounds", _int),
+    )
+
+
+class Way(ctypes.Structure):
+    """``sf_way``."""
+
+    _fields_ = (
+        *((name, _pointer) for name in ("begun", "rate")),
+        *((name, _double) for name in ("done", "step")),
+        ("tries", _int),
+        *((name, _double) for name in ("longest", "linear", "unbalanced", "still", "shortest", "least", "brief")),
+    )
+
+
+NAMES_OF_CASES = ("count", "datum", "row", "zero", "near", "longest", "stiffer", "state", "found", "residual")
+
+
+class Cases(ctypes.Structure):
+    """``sf_cases``."""
+
+    _fields_ = (
+        *((name, _int) for name in ("cases", "done", "groups")),
+        *((name, _pointer) for name in NAMES_OF_CASES),
+    )
+
+
+HANDED = (TapeTable, Group, Model, Point, Factors, Pivoted, System, Limits, Border, Report, Counting, Way, Cases)
 
 SIZES = (16, *(ctypes.sizeof(kind) for kind in HANDED), len(NAMES))
 """What the core says of the sizes of what is handed to it, if it is the one that this module was written for."""
 
-VERSION = 1
+VERSION = 2
 """Number of the interface, as ``SF_VERSION``."""
 
 
@@ -270,5 +306,8 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL | None:
     library.sf_backward.argtypes = [_pointer, _int, _pointer, _pointer]
     library.sf_correct_size.argtypes = [_pointer]
     library.sf_correct.argtypes = [_pointer] * 10
+    library.sf_follow_size.argtypes = [_pointer]
+    library.sf_follow.argtypes = [_pointer] * 10
+    library.sf_solve_cases.argtypes = [_pointer] * 9
     library.sf_solve.argtypes = [_pointer, _pointer, _int, _pointer, _pointer, _pointer]
     return library

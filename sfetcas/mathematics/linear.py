@@ -20,6 +20,8 @@ from .keeping import kept
 from .kernels import Batch
 
 __all__ = [
+    "BLURRED",
+    "MISSES",
     "NO_ROOM",
     "CoreFactors",
     "CoreSystem",

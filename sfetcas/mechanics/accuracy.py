@@ -7,14 +7,17 @@ solution is as smooth as this supposes is seen from its highest Legendre coeffic
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..mathematics import interpolation
 from ..mathematics.arrays import Array
 from .fields import Fields
 from .tubes import roughness as twisted
 
-__all__ = ["every_other", "gained", "halving", "largest_difference", "remaining", "roughness"]
+__all__ = ["WITHIN", "every_other", "gain", "gained", "halving", "largest_difference", "remaining", "roughness"]
 
 SAFETY = 4.0
 """Estimates are this many times what the order of the elements says of the error that is left."""
@@ -55,25 +58,32 @@ def gained(coarse: Fields, fine: Fields, *, positions: bool = True) -> float:
         The error of positions, of order ``min(2p, p + 2)`` between the ends of elements; else of quantities of order p.
     """
     before, after = (float(roughness(side).max(initial=0.0)) for side in (coarse, fine))
-    order = coarse.model.element.order
+    return float(gain(before, after, coarse.model.element.order, positions=positions))
+
+
+def gain(before: ArrayLike, after: ArrayLike, order: int, *, positions: bool = True) -> Array:
+    """As :func:`gained`, from the largest roughness on the coarse mesh and on the fine one, numbers or arrays."""
+    before, after = np.asarray(before, dtype=float), np.asarray(after, dtype=float)
     power = min(2.0 * order, order + 2.0) if positions else float(order)
     # Never more than the order says.
-    return float(np.clip(after / before, 0.5**order, 1.0)) ** (power / order) if before > 0.0 else 1.0
+    ratio = np.divide(after, before, out=np.ones(before.shape), where=before > 0.0)
+    return np.asarray(np.clip(ratio, 0.5**order, 1.0) ** (power / order))
 
 
-def remaining(difference: float, gain: float) -> float:
+def remaining(difference: Any, gain: Any) -> Any:
     """Estimated error after all elements were halved.
 
     Parameters
     ----------
-    difference : float
+    difference : float or ndarray
         Relative difference that the halving made.
-    gain : float
+    gain : float or ndarray
         Ratio of the errors, see :func:`gained`.
     """
     # The order is that of small errors: of larger ones the next term is as much as the square root of them.
-    gain = max(gain, np.sqrt(difference))
-    return max(difference * min(1.0, SAFETY * gain), min(difference, BLUR))
+    gain = np.maximum(gain, np.sqrt(difference))
+    found = np.maximum(difference * np.minimum(1.0, SAFETY * gain), np.minimum(difference, BLUR))
+    return found if np.ndim(found) else float(found)
 
 
 def roughness(fields: Fields) -> Array:

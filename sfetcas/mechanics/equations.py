@@ -20,11 +20,11 @@ import numpy as np
 from .. import tolerances
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array, Index
-from ..mathematics.core import Border, Limits, Report
+from ..mathematics.core import Border, Counting, Limits, Report, Way, doubles
 from ..mathematics.kernels import Kernels, chosen
-from ..mathematics.linear import SparseSolver
+from ..mathematics.linear import CoreSystem, SparseSolver
 from .batches import GroupBatch, at_rest
-from .evaluation import UNLOADED, CorePoint, core_model
+from .evaluation import UNLOADED, CoreModel, CorePoint, core_model
 from .layout import Layout, layout_of
 from .load_terms import present
 from .loading import Loading
@@ -456,6 +456,19 @@ class Equations:
         there, point, report = self._core.correct(system, _arrays(state), given, tangent, border, limits)
         return State(*there), self._point_of(point), report
 
+    def followed(
+        self, state: State, tangent: Array, way: Way, limits: Limits, counting: Counting | None
+    ) -> tuple[State, bool] | None:
+        """Growing loads followed by the core: the last equilibrium, and whether the way ends; None without a core.
+
+        Arguments are those of :meth:`.CoreModel.follow`.
+        """
+        system = self.solver.of_core
+        if system is None or self._core is None:
+            return None
+        there, reached = self._core.follow(system, _arrays(state), doubles(tangent), way, limits, counting)
+        return State(*there), reached
+
     @property
     def by_core(self) -> bool:
         """Whether the core evaluates these equations."""
@@ -631,6 +644,14 @@ class Equations:
     @functools.cached_property
     def solver(self) -> SparseSolver:
         """Sparse solver for the Newton matrix."""
+        return self._new_solver()
+
+    def apart(self) -> tuple[CoreModel, CoreSystem] | None:
+        """The model and a system for the core with memory of their own, for another thread; None without a core."""
+        system = self._new_solver().of_core
+        return None if system is None or self._core is None else (self._core.of(self.model), system)
+
+    def _new_solver(self) -> SparseSolver:
         symmetric = self.model.has_potential
         # What lies without a force has none to rounding only with pivots: softness leaves some.
         return SparseSolver(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 import ctypes
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -290,7 +290,7 @@ class CoreModel:
     def of(self, model: Model) -> CoreModel:
         """The same of a model that differs by the data of terms alone, with memory of its own."""
         found = copy.copy(self)
-        for made in ("_correcting", "_sloping"):
+        for made in ("_correcting", "_following", "_sloping"):
             found.__dict__.pop(made, None)
         found._model = c.Model.from_buffer_copy(self._model)
         found._take(model)
@@ -391,6 +391,83 @@ class CoreModel:
         while self._library.sf_correct(self._address, *addresses, *of_structures, *memory) == NO_ROOM:
             system.make_room()
         return (q, y, lam, unwrapped), point, report
+
+    def follow(
+        self,
+        system: CoreSystem,
+        state: tuple[Array, Array, Array, Array],
+        tangent: Array,
+        way: c.Way,
+        limits: c.Limits,
+        counting: c.Counting | None,
+    ) -> tuple[tuple[Array, Array, Array, Array], bool]:
+        """Follow growing loads from a state (q, y, lam, unwrapped): the last equilibrium, and whether the way ends.
+
+        Parameters
+        ----------
+        system : CoreSystem
+            Solves for the steps.
+        state : tuple of ndarray
+            An equilibrium where the way begins.
+        tangent : ndarray (entries,)
+            Entries of the matrix there.
+        way : Way
+            Changed: how far it was followed, and the next step.
+        limits : Limits
+            Of the corrections.
+        counting : Counting, optional
+            How eigenvalues are counted; else none are.
+        """
+        q, y, lam, unwrapped = there = tuple(np.array(part, dtype=float) for part in state)
+        handed, point, report = c.State(*(part.ctypes.data for part in there)), CorePoint(self), c.Report()
+        counted = None if counting is None else ctypes.addressof(counting)
+        addresses = (ctypes.addressof(way), ctypes.addressof(limits), counted, tangent.ctypes.data)
+        rest = (ctypes.addressof(handed), point.address, self._following.ctypes.data, ctypes.addressof(report))
+        while (ended := self._library.sf_follow(self._address, system.address, *addresses, *rest)) == NO_ROOM:
+            system.make_room()
+        return (q, y, lam, unwrapped), not ended
+
+    def solve_cases(
+        self,
+        system: CoreSystem,
+        cases: c.Cases,
+        way: c.Way | None,
+        limits: tuple[c.Limits, c.Limits],
+        counting: c.Counting,
+        varying: Sequence[int],
+    ) -> None:
+        """Solve many cases, see ``sf_solve_cases``; they are changed.
+
+        Parameters
+        ----------
+        system : CoreSystem
+        cases : Cases
+            Without what says where data that vary stand.
+        way : Way, optional
+            How loads are followed from zero; without it states are corrected alone.
+        limits : (Limits, Limits)
+            Of corrections on the way, and from near states.
+        counting : Counting
+        varying : sequence of int
+            Numbers of the groups whose data vary: they are overwritten, so that this model is no other's.
+        """
+        for number in varying:
+            self._data[number] = self._data[number].copy()
+            self._groups[number].datum = self._data[number].ctypes.data
+        data = [self._data[number] for number in varying]
+        counts = c.integers(np.array([part.size for part in data]))
+        places = np.array([part.ctypes.data for part in data], dtype=np.uintp)
+        cases.groups, cases.count, cases.datum = len(data), counts.ctypes.data, places.ctypes.data
+        followed = None if way is None else ctypes.addressof(way)
+        addresses = [ctypes.addressof(part) for part in (*limits, counting)]
+        rest = (ctypes.addressof(cases), followed, *addresses, self._scratch.address, self._following.ctypes.data)
+        while self._library.sf_solve_cases(self._address, system.address, *rest) == NO_ROOM:
+            system.make_room()
+
+    @functools.cached_property
+    def _following(self) -> Array:
+        """Memory that a way takes."""
+        return np.zeros(self._library.sf_follow_size(self._address))
 
     @functools.cached_property
     def _correcting(self) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -623,10 +624,14 @@ class Arguments:
             found.setdefault(point.members[0], {})[before] = there
         return found
 
-    def accepted(self, values: Array) -> bool:
-        """Whether values (numbers,), in the units of the scene, are finite and within their limits."""
-        limits = [one.limits for one in self.arguments for _ in one.default]
-        return all(low <= x <= high and np.isfinite(x) for x, (low, high) in zip(values, limits, strict=True))
+    def accepted(self, values: Array) -> Array:
+        """Whether values (..., numbers), in the units of the scene, are finite and within their limits, (...)."""
+        low, high = self._limits
+        return np.asarray(((low <= values) & (values <= high) & np.isfinite(values)).all(axis=-1))
+
+    @functools.cached_property
+    def _limits(self) -> Array:
+        return np.array([one.limits for one in self.arguments for _ in one.default]).reshape(-1, 2).T
 
     # -- the model with symbols -----------------------------------------------------------------------
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..description.records import unknown
+from ..description.records import counted, say, unknown
 from ..description.scene import Scene, check_scene
 from ..description.showing import shown, stability_in_words, values_in_words
 from ..equilibria.settings import Settings
@@ -25,6 +25,7 @@ from ..mechanics.expressions import Expressions
 from ..mechanics.fields import transferred
 from ..mechanics.model import assemble
 from ..mechanics.unilateral import Stops, Unilateral
+from ..processes import cores
 from ..solvers.globalised import MEANINGS, NOT_DEFINED, Code, Globalised, Outcome
 from ..solvers.prepared import Prepared
 from ..solvers.program import Program
@@ -32,10 +33,11 @@ from .arguments import Argument, Asked, in_words
 from .choosing import Choosing
 from .equilibrium import SOLVED, EquilibriumSolver, Place, equilibrium_solver, refuse_search
 from .implicit import Implicit, Slopes
+from .plain import PlainCases, plain_cases
 from .results import Result, Results
 from .touching import Touching
 
-__all__ = ["ParametricAnswer", "ParametricEquilibrium", "Values", "parametric"]
+__all__ = ["ParametricAnswer", "ParametricAnswers", "ParametricEquilibrium", "Values", "parametric"]
 
 Values = Mapping[str, ArrayLike]
 """Values of parameters by their names, in the units of the scene; those left out have their defaults."""
@@ -213,6 +215,89 @@ class ParametricEquilibrium:
             return self._touching(self.touching, numbers, start)
         return self._solved(numbers, start)
 
+    def many(
+        self,
+        values: Values,
+        *,
+        warm: bool = False,
+        threads: int | None = None,
+        progress: Callable[[int], object] | None = None,
+    ) -> ParametricAnswers:
+        """The equilibria for many values of parameters, most of them at once by the core, in threads.
+
+        Those in which nothing out of the ordinary happens are the same as of :func:`~sfetcas.solve`: their loads are
+        followed from zero, and each has an error estimate; see :func:`~sfetcas.sweep`.  All others are those of
+        :meth:`solve`.
+
+        Parameters
+        ----------
+        values : mapping
+            A column (cases,) or (cases, k) for each parameter that changes, in the units of the scene.
+        warm : bool
+            Begin at the nearest case solved before: several times faster, but which of several stable equilibria is
+            found depends on the order of the cases.
+        threads : int, optional
+            By default as many as there are processors.
+        progress : callable, optional
+            Called with the number of cases done since the last call.
+
+        Raises
+        ------
+        SceneError
+            Other names, columns of unlike length, or values that are no finite numbers.
+
+        Examples
+        --------
+        >>> equilibrium = parametric(scene, ["loads.tip.value.1"], ["nodes.tip.position"])    # doctest: +SKIP
+        >>> equilibrium.many({"loads.tip.value.1": [0, 5, 10]})["nodes.tip.position"]         # doctest: +SKIP
+        """
+        numbers = self._columns(values)
+        found = np.full((len(numbers), self.solver.results.size), np.nan)
+        errors, residuals = np.full((2, len(numbers)), np.nan)
+        left, failures, plain = np.arange(len(numbers)), dict[int, str](), self._plain
+        if not isinstance(plain, str):
+            answers = plain.solve(numbers, warm=warm, threads=threads or cores(), progress=progress)
+            if answers.interrupted:
+                raise KeyboardInterrupt
+            found, errors, residuals = answers.numbers, answers.errors, answers.residuals
+            left = np.flatnonzero(~answers.known)
+        for i in left.tolist():
+            try:
+                own = self.solve(self.by_parameter(numbers[i]))
+                found[i] = np.concatenate([np.zeros(0), *(answer.ravel() for answer in own.answers.values())])
+                residuals[i] = own.residual
+            except (SceneError, SolveError) as error:
+                failures[i] = str(error)
+            if progress is not None:
+                progress(1)
+        return ParametricAnswers(self, numbers, found, errors, residuals, failures)
+
+    def _columns(self, values: Values) -> Array:
+        """Values (cases, numbers) of all parameters."""
+        names = [one.name for one in self.parameters]
+        for name in values:
+            if name not in names:
+                raise SceneError(unknown(name, names, "such parameters"), ("values",))
+        cases = max((len(np.atleast_1d(np.asarray(column, dtype=object))) for column in values.values()), default=1)
+        found = np.repeat(self.solver.arguments.defaults[None, :], cases, axis=0)
+        begin = 0
+        for one in self.parameters:
+            size = len(one.default)
+            if one.name in values:
+                found[:, begin : begin + size] = _column(one.name, values[one.name], (cases, size))
+            begin += size
+        return found
+
+    @functools.cached_property
+    def _plain(self) -> PlainCases | str:
+        """What solves most cases at once; or what hinders it, in a few words."""
+        solver = self.solver
+        results = [one.name for one in solver.results.results]
+        known, places = (solver.model.mesh, solver.model.assembly), solver.results.places
+        asked = {"type": "static", "equilibria": "one", "steps": solver.scene.analysis.steps[-1:]}
+        scene = solver.scene.model_copy(update={"analysis": solver.scene.analysis.model_copy(update=asked)})
+        return plain_cases(scene, solver.arguments.arguments, results, self.settings, places=places, known=known)
+
     def _chosen(self, choosing: Choosing, numbers: Array, start: ParametricAnswer | None) -> ParametricAnswer:
         """The equilibrium in a choice of what is taut and at a stop that holds, beginning with that of ``start``."""
         known: dict[Stops, ParametricAnswer] = {}
@@ -296,6 +381,72 @@ def _given(one: Argument, value: ArrayLike) -> Array:
         accepted = f"{low:g} to {high:g}" if one.low is not None else "above zero" if low > 0.0 else "zero or more"
         raise SceneError(f"found {wrong:g}, accepted: {accepted}", ("values", one.name))
     return given
+
+
+def _column(name: str, values: ArrayLike, shape: tuple[int, int]) -> Array:
+    """The values of one parameter for all cases."""
+    try:
+        found = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+    own = shape if shape[1] > 1 else shape[:1]
+    if found.shape not in (shape, own) or not np.isfinite(found).all():
+        told = f"an array of shape {found.shape}" if found.size and np.isfinite(found).all() else say(values)
+        accepted = f"finite numbers in an array of shape {own}, with as many cases as the others"
+        raise SceneError(f"found {told}, accepted: {accepted}", ("values", name))
+    return found.reshape(shape)
+
+
+@dataclass(frozen=True, eq=False)
+class ParametricAnswers:
+    """Equilibria for many values of parameters, see :meth:`ParametricEquilibrium.many`.
+
+    ``answers["nodes.tip.position"]`` are an answer of all cases by its name, (cases,) and its own shape.
+
+    Attributes
+    ----------
+    of : ParametricEquilibrium
+    numbers : ndarray (cases, numbers)
+        Values of the parameters, in the units of the scene.
+    results : ndarray (cases, results)
+        Numbers of all answers; nan where there is none.
+    errors : ndarray (cases,)
+        Estimated errors of positions over the size of the scene; nan where a case was solved by itself.
+    residuals : ndarray (cases,)
+        Largest relative residuals.
+    failures : mapping of int to str
+        By their numbers, why cases have no answer.
+    """
+
+    of: ParametricEquilibrium
+    numbers: Array
+    results: Array
+    errors: Array
+    residuals: Array
+    failures: Mapping[int, str]
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __repr__(self) -> str:
+        solved = len(self) - len(self.failures)
+        told = [f"{counted(len(self), 'case')}, {solved} solved", f"errors up to {np.nanmax([0.0, *self.errors]):.1e}"]
+        return shown(self, told, in_words(self.of.solver.arguments, self.of.solver.results))
+
+    def __getitem__(self, name: str) -> Array:
+        """An answer by its name, of all cases.
+
+        Raises
+        ------
+        SceneError
+            There is none of this name.
+        """
+        begin = 0
+        for one in self.of.answers:
+            if one.name == name:
+                return self.results[:, begin : begin + one.size].reshape(len(self), *one.shape)
+            begin += one.size
+        raise SceneError(unknown(name, [one.name for one in self.of.answers], "such answers"), ("answers",))
 
 
 @dataclass(frozen=True, eq=False)

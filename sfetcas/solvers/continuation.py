@@ -15,21 +15,26 @@ from typing import TypeVar
 import numpy as np
 
 from ..errors import SolveError
+from ..mathematics.core import Way
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
+from .newton import Limits
 from .prepared import Prepared, Solved
 
 __all__ = [
     "CONTRACTION",
+    "FARTHEST",
     "JUMPED",
     "NARROW",
     "STEP_ROTATION",
+    "TRAVEL",
     "Followed",
     "advanced",
     "between",
     "follow",
     "near_factor",
+    "plain_way",
 ]
 
 STEP_ROTATION = 0.4
@@ -37,6 +42,9 @@ STEP_ROTATION = 0.4
 
 CONTRACTION = 0.35
 """... or do not shrink at least by this from one to the next."""
+
+FIRST, BRIEF = 0.5, 0.05
+"""Part of the way of the first step; below a second correction of so much, rad, steps grow by four, else by two."""
 
 SHORTEST = 1e-4
 """Steps below this share of the way done end the search on this branch."""
@@ -163,6 +171,7 @@ def follow(
     allowed: Callable[[Solved, Solved], bool] | None = None,
     refuse: Callable[[Solved], None] | None = None,
     contraction: float = CONTRACTION,
+    proportional: bool | None = None,
 ) -> Followed:
     """Natural-parameter continuation from ``way(0)``, where ``state`` is an equilibrium, to ``way(1)``.
 
@@ -171,7 +180,8 @@ def follow(
     Newton's method carries.  A step that is not ``allowed`` from one equilibrium to the next is too long, and where
     short ones are not either the way ends.  ``refuse`` is shown each, and raises where there is no sense in going on.
     Corrections shrink by ``contraction`` at least; an infinite one is for stiffnesses that jump at the
-    beginning of any step.
+    beginning of any step.  ``proportional`` says whether loads are along the way; by default where there are no
+    histories.
     """
     # What is driven may meet on its way what snaps, and in space a whole turn looks like none.
     whole = way(1.0).plus(way(0.0).scaled(-1.0))
@@ -179,10 +189,29 @@ def follow(
     driven = min(max(turn, float(np.abs(whole.shift).max(initial=0.0)) / TRAVEL, 1.0), FARTHEST)
     longest = 1.0 / max(turn if prepared.model.space else 0.0, driven)
     tries = MOST + int(AROUND * driven) if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL
-    following = _Following(prepared, way, longest, switch_branch, allowed, refuse, contraction)
+    proportional = not prepared.model.scene.histories if proportional is None else proportional
+    following = _Following(prepared, way, longest, switch_branch, allowed, refuse, contraction, proportional)
     begin = _On(prepared.correct(state, way(0.0)), 0.0)
-    here, reached = advanced(begin, 0.5, following.trial, lambda here: here.done >= 1.0, tries=tries)
+    plainly = following.plainly(begin, whole, tries)
+    here, reached = advanced(*plainly[:2], following.trial, lambda here: here.done >= 1.0, tries=plainly[2])
     return Followed(here.found.state, reached, tuple(following.left))
+
+
+def plain_way(contraction: float = CONTRACTION) -> tuple[Way, Limits]:
+    """A way as the core follows it, and the limits of corrections on it; see :func:`follow`."""
+    way = Way(
+        done=0.0,
+        step=FIRST,
+        tries=MOST,
+        longest=1.0,
+        linear=LINEAR,
+        unbalanced=UNBALANCED,
+        still=STILL,
+        shortest=SHORTEST,
+        least=LEAST_STEP,
+        brief=BRIEF,
+    )
+    return way, Limits(most=STEP_ROTATION, contraction=contraction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,8 +237,30 @@ class _Following:
     allowed: Callable[[Solved, Solved], bool] | None
     refuse: Callable[[Solved], None] | None
     contraction: float
+    proportional: bool
     left: list[float] = field(default_factory=list)
     crept: int = 0
+
+    def plainly(self, begin: _On, whole: Loading, tries: int) -> tuple[_On, float, int]:
+        """What the core follows by itself: the last point, the length of the next step, and the trials that are left.
+
+        It takes the decisions of :meth:`trial`, as long as loads are proportional and nothing comes near to being
+        unstable.
+        """
+        prepared, model, usual = self.prepared, self.prepared.model, (begin, FIRST, tries)
+        counted = self.switch_branch and prepared.switches_branch
+        proportional = self.proportional and not (whole.turned or model.unwrapping.driven)
+        known = begin.found.converged and model.has_potential and self.allowed is None and self.refuse is None
+        if not (proportional and known):
+            return usual
+        way, limits = plain_way(self.contraction)
+        way.tries, way.longest = tries, self.longest
+        found = prepared.followed(begin.found, whole, way, limits, counted=counted)
+        if found is None:
+            return usual
+        if way.done == 0.0:
+            return begin, way.step, way.tries
+        return _On(Solved.taken(prepared, found[0], self.way(way.done)), way.done), way.step, way.tries
 
     def trial(self, here: _On, step: float) -> tuple[_On | None, float]:
         """The next point, None if the step is refused, and the length of the next step, parts of the way."""
@@ -233,14 +284,14 @@ class _Following:
             if not stuck and step > max(SHORTEST * here.done, LEAST_STEP):
                 return None, step * (0.1 if here.done == 0.0 else 0.5 if there.iterations > 2 else 0.25)
             return (None, 0.0) if stuck else self._snapped(here)
-        following = step * (4.0 if there.second < 0.05 else 2.0)
+        following = step * (4.0 if there.second < BRIEF else 2.0)
         if unstable > 0:
             if trial - here.done > NARROW * here.done:
                 return None, 0.5 * (trial - here.done)
             switched = self._switched(there, there.loading)
             if switched is None or not self._free(here, switched):
                 return None, 0.0
-            there, following = switched, 0.1 * (4.0 if switched.second < 0.05 else 2.0)
+            there, following = switched, 0.1 * (4.0 if switched.second < BRIEF else 2.0)
             self.left.append(trial)
         if self.refuse is not None:
             self.refuse(there)

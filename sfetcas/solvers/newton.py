@@ -36,6 +36,7 @@ __all__ = [
     "correct",
     "descend",
     "largest_rotation",
+    "limits_for_core",
     "newton",
     "newton_step",
 ]
@@ -383,13 +384,32 @@ def _by_core(system: System, state: State, factor: float, limits: Limits) -> Con
         redundant(equations, equations.at(begin, loading))
     if equations.rows and equations.redundant:
         return None
-    slides, weight = integers(equations.slid_places), doubles(known.weight)
+    controls, alive = limits_for_core(equations, limits, known.weight)
     border = None
     if known.border is not None:
         begun, rate, row, unit, passing = known.border
         row = doubles(row)
         border = Border(begun.ctypes.data, rate.ctypes.data, row.ctypes.data, unit, passing, factor)
-    controls = CoreLimits(
+    given = known.weight if known.given is None else known.given
+    found = equations.corrected(begin, given, controls, tangent=known.tangent, border=border)
+    del alive
+    if found is None:
+        return None
+    there, point, report = found
+    residual, good = report.residual, bool(report.good)
+    if border is not None:
+        loading = system.loading(border.factor)
+    if good:
+        there, point = with_sharing(equations, there, loading, point, max(report.tolerance, residual))
+        residual = relative_residual(equations, point)
+    lengths = [report.first, report.second][: report.steps]
+    return Converged(there, loading, point, residual, good, report.iterations, *_first_two(lengths, good))
+
+
+def limits_for_core(equations: Equations, limits: Limits, weight: Array) -> tuple[CoreLimits, tuple[Array, ...]]:
+    """Limits as the core takes them, with the weight of the proximal term, and arrays that have to live as long."""
+    slides, weight = integers(equations.slid_places), doubles(weight)
+    found = CoreLimits(
         iterations=limits.iterations,
         returns=limits.returns,
         slides=len(slides),
@@ -410,19 +430,7 @@ def _by_core(system: System, state: State, factor: float, limits: Limits) -> Con
         dual=tolerances.DUAL,
         weight=weight.ctypes.data,
     )
-    given = weight if known.given is None else known.given
-    found = equations.corrected(begin, given, controls, tangent=known.tangent, border=border)
-    if found is None:
-        return None
-    there, point, report = found
-    residual, good = report.residual, bool(report.good)
-    if border is not None:
-        loading = system.loading(border.factor)
-    if good:
-        there, point = with_sharing(equations, there, loading, point, max(report.tolerance, residual))
-        residual = relative_residual(equations, point)
-    lengths = [report.first, report.second][: report.steps]
-    return Converged(there, loading, point, residual, good, report.iterations, *_first_two(lengths, good))
+    return found, (slides, weight)
 
 
 def _first_two(lengths: list[float], good: bool) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from ..description.showing import shown
 from ..errors import SolveError, Status
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
+from ..mathematics.core import Way, doubles
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt, NLPResult
 from ..mechanics.equations import Equations, Point, State
@@ -28,7 +29,7 @@ from .divergence import TangentTest
 from .evaluated import Evaluated
 from .globalised import Code, Globalised, Rules
 from .guess import first_guess, lacks_slack, restore
-from .newton import AtLoads, Limits, correct
+from .newton import AtLoads, Limits, correct, limits_for_core
 from .problem import EquilibriumProblem
 from .pseudo_transient import flow
 from .redundancy import loose_rows, stretched
@@ -180,6 +181,34 @@ class Prepared:
         """
         system = AtLoads(self.equations, loading, self._test.weight, tangent, flat, drag)
         return Solved(self, **correct(system, state, limits=Limits(**limits))._asdict())
+
+    def followed(
+        self, begin: Solved, rate: Loading, way: Way, limits: Limits, *, counted: bool
+    ) -> tuple[State, bool] | None:
+        """Growing loads followed by the core from an equilibrium, as far as it can: see :meth:`.Equations.followed`.
+
+        Parameters
+        ----------
+        begin : Solved
+        rate : Loading
+            What is added to its loading along the way, in proportion.
+        way : Way
+            Changed; what is given is set here.
+        limits : Limits
+            Of the corrections.
+        counted : bool
+            Whether eigenvalues are counted, so that the way ends where one is not clearly above zero.
+        """
+        equations = self.equations
+        counting = self._test.counting() if counted else None
+        if not equations.by_core or (equations.rows and equations.redundant) or (counted and counting is None):
+            return None
+        begun, along = (doubles(equations.given(loading)) for loading in (begin.loading, rate))
+        way.begun, way.rate = begun.ctypes.data, along.ctypes.data
+        controls, alive = limits_for_core(equations, limits, self._test.weight)
+        found = equations.followed(begin.state, begin.point.entries, way, controls, counting and counting[0])
+        del alive, counting
+        return found
 
     @functools.cached_property
     def _tangent(self) -> TangentTest:

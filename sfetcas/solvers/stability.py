@@ -28,7 +28,8 @@ import numpy as np
 from .. import tolerances
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
-from ..mathematics.linear import InertiaSolver, Product, SparseSolver, blurred, pattern
+from ..mathematics.core import Counting
+from ..mathematics.linear import BLURRED, MISSES, InertiaSolver, Product, SparseSolver, blurred, pattern
 from ..mechanics.equations import Equations, Point
 from .redundancy import independent
 from .sides import Sides, alike
@@ -444,6 +445,28 @@ class StabilityTest:
     def _below_dense(self, point: Point, shift: float) -> int:
         values = np.linalg.eigvalsh(self._projected(self._weighted(point), self._rows(point))[0])
         return int((values[self._apart :] < shift).sum())
+
+    def counting(self) -> tuple[Counting, Array] | None:
+        """How the core tells that all eigenvalues are above :data:`CLEAR_OF_ZERO`, and an array that lives as long.
+
+        None where there is a place that slides, whose negative eigenvalue does not count.
+        """
+        if self._apart:
+            return None
+        weight = np.zeros(self.equations.total)
+        weight[self._chosen] = self._weights
+        found = Counting(
+            weight=weight.ctypes.data,
+            shift=CLEAR_OF_ZERO,
+            softest=self.softest,
+            soft=BORDER_REGULARISATION,
+            rounding=ENTRIES_BLUR,
+            graded=GRADED,
+            broken=BROKEN,
+            blurred=BLURRED,
+            rounds=MISSES,
+        )
+        return found, weight
 
     @functools.cached_property
     def _bordered(self) -> InertiaSolver:

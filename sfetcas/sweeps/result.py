@@ -23,8 +23,9 @@ from ..files import write_file
 from ..mathematics.arrays import Array
 from ..quoting import csv_cell
 from .cases import Cases
+from .outcomes import Outcomes
 from .quantities import Wanted
-from .work import SHORT, SOLVED, Outcome
+from .work import SHORT, SOLVED
 
 __all__ = ["ENDINGS", "Failure", "Sweep", "check_table", "gathered"]
 
@@ -64,8 +65,8 @@ class Sweep:
         A column for each single number.
     quantities : mapping of ndarray
         By the names given, (cases, k), in their units; nan where there is no answer.
-    outcomes : tuple of Outcome
-        Status, notes and time of each case.
+    outcomes : Outcomes
+        Status, notes and time of each case, a sequence.
     wall : float
         Wall time of the sweep, s.
     interrupted : bool
@@ -75,7 +76,7 @@ class Sweep:
     scene: Scene = field(repr=False)
     cases: Cases = field(repr=False)
     quantities: Mapping[str, Array] = field(repr=False)
-    outcomes: tuple[Outcome, ...] = field(repr=False)
+    outcomes: Outcomes = field(repr=False)
     wall: float
     interrupted: bool = False
 
@@ -99,7 +100,7 @@ class Sweep:
     @property
     def solved(self) -> Array:
         """Which cases have an answer, (cases,) of bool."""
-        return np.array([outcome.status in (SOLVED, SHORT) for outcome in self.outcomes], dtype=bool)
+        return np.isin(self.outcomes.column("status"), (SOLVED, SHORT))
 
     @property
     def failures(self) -> tuple[Failure, ...]:
@@ -107,7 +108,7 @@ class Sweep:
         columns = self.cases.columns
         return tuple(
             Failure(i, {name: float(column[i]) for name, column in columns.items()}, outcome.status, outcome.reason)
-            for i, outcome in enumerate(self.outcomes)
+            for i, outcome in sorted(self.outcomes.own.items())
             if outcome.status not in (SOLVED, SHORT)
         )
 
@@ -124,10 +125,8 @@ class Sweep:
             names = [name] if values.shape[1] == 1 else [_component(name, i) for i in range(values.shape[1])]
             for column, numbers in zip(names, values.T, strict=True):
                 found[f"answer.{column}" if column in self.cases.columns else column] = numbers
-        for key in ("status", "reason", "notes"):
-            found[key] = np.array([getattr(outcome, key) for outcome in self.outcomes], dtype=str)
-        for key in ("error_estimate", "seconds"):
-            found[key] = np.array([getattr(outcome, key) for outcome in self.outcomes])
+        for key in ("status", "reason", "notes", "error_estimate", "seconds"):
+            found[key] = self.outcomes.column(key)
         return MappingProxyType(found)
 
     def values(self, name: str) -> Array:
@@ -243,20 +242,17 @@ def gathered(
     scene: Scene,
     cases: Cases,
     wanted: Sequence[Wanted],
-    outcomes: Sequence[Outcome],
+    outcomes: Outcomes,
     wall: float,
     interrupted: bool,
 ) -> Sweep:
     """The :class:`Sweep` of the outcomes of all cases."""
     quantities = {}
     for k, one in enumerate(wanted):
-        rows = [outcome.numbers[k] if outcome.numbers else np.zeros(0) for outcome in outcomes]
-        found = np.full((len(rows), max([1, *map(len, rows)])), np.nan)
-        for i, row in enumerate(rows):
-            found[i, : len(row)] = row
+        found = outcomes.quantity(k)
         found.flags.writeable = False
         quantities[one.text] = found
-    return Sweep(scene, cases, MappingProxyType(quantities), tuple(outcomes), wall, interrupted)
+    return Sweep(scene, cases, MappingProxyType(quantities), outcomes, wall, interrupted)
 
 
 def _component(text: str, number: int) -> str:

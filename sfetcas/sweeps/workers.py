@@ -20,7 +20,7 @@ from ..description.records import whole
 from ..errors import SceneError
 from ..processes import begin_apart, context_of, postponed
 
-__all__ = ["Workers", "cores"]
+__all__ = ["Workers"]
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -31,13 +31,6 @@ AHEAD = 2
 """Pieces of work that a process has at once: it does not wait for the next one."""
 
 MOST = 10_000
-
-
-def cores() -> int:
-    """Number of processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 class _Lane:

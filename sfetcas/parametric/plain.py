@@ -1,0 +1,538 @@
+"""Many equilibria of one scene by the core: those of cases in which nothing out of the ordinary happens.
+
+Plain is a case whose loads are followed from zero, on a mesh that is accurate enough for the scene itself, along
+equilibria all of whose eigenvalues are clearly above zero, and whose error on a mesh with half the elements is small
+enough.  All others are left to :func:`~sfetcas.solve`.  Decisions are those of
+:mod:`~sfetcas.solvers.continuation` and :mod:`~sfetcas.equilibria.refinement`; each case is independent of all others.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..description.scene import Scene
+from ..equilibria.refinement import DRIFT, TORN
+from ..equilibria.settings import Settings
+from ..mathematics import interpolation
+from ..mathematics.arrays import Array, Index
+from ..mathematics.constants import times
+from ..mathematics.core import Cases, doubles, integers
+from ..mathematics.many import Many
+from ..mechanics.accuracy import WITHIN, gain, remaining
+from ..mechanics.equations import State
+from ..mechanics.fields import transferred
+from ..mechanics.mesh import Mesh
+from ..mechanics.model import Model, assemble
+from ..mechanics.stations import Stations
+from ..solvers.continuation import FARTHEST, TRAVEL, plain_way
+from ..solvers.newton import Limits, limits_for_core
+from ..solvers.prepared import Prepared
+from ..stopping import arrived
+from .arguments import Argument, Arguments
+from .equilibrium import asked_mesh, chosen_places
+from .results import Results
+
+__all__ = ["NO_CORE", "PlainAnswers", "PlainCases", "nearest_before", "plain_cases"]
+
+NO_CORE = "no core, which needs a C compiler"
+"""What hinders all cases where there is none: they are solved one by one then."""
+
+CHUNK = 512
+"""Cases that a thread solves together: functions of all of them are evaluated at once."""
+
+MESHES = 4
+"""Meshes, each with twice the elements of the one before, of which the last two have to be near enough."""
+
+LEFT_ALONE = 0.5
+"""Share of the accuracy that errors of cases may have, so that none is near to where meshes are refined."""
+
+
+@dataclass(frozen=True)
+class PlainAnswers:
+    """Answers of cases, in their order.
+
+    Attributes
+    ----------
+    known : ndarray (cases,) of bool
+        Which cases were plain.
+    numbers : ndarray (cases, results)
+        Results in the units of the scene; nan where there is none.
+    errors : ndarray (cases,)
+        Estimated errors of positions over the size of the scene.
+    residuals : ndarray (cases,)
+        Largest relative residuals.
+    seconds : ndarray (cases,)
+        Wall time of each, in its thread.
+    interrupted : bool
+        Whether it was interrupted, so that some were not looked at.
+    """
+
+    known: Array
+    numbers: Array
+    errors: Array
+    residuals: Array
+    seconds: Array
+    interrupted: bool = False
+
+
+def plain_cases(
+    scene: Scene,
+    arguments: Sequence[Argument],
+    results: Sequence[str],
+    settings: Settings,
+    *,
+    places: Mapping[str, Sequence[float]] | None = None,
+    known: tuple[Mesh, Any] | None = None,
+) -> PlainCases | str:
+    """The cases of a scene with other numbers; or, where none of them is plain, why in a few words.
+
+    Parameters
+    ----------
+    scene : Scene
+    arguments : sequence of Argument
+        The numbers that change.
+    results : sequence of str
+        What is wanted of each answer.
+    settings : Settings
+        As of :func:`~sfetcas.solve`.
+    places : mapping, optional
+        Fractions of the lengths of members at which results along them are given.
+    known : (Mesh, assembly), optional
+        The mesh that the scene's accuracy asks for, where it has been found before.
+
+    Raises
+    ------
+    SceneError
+        The scene has no such numbers or answers, or is not one of statics.
+    SolveError
+        It has no equilibrium with its own numbers.
+    """
+    why = _extraordinary(scene, settings)
+    if why:
+        return why
+    mesh, assembly = known or asked_mesh(scene, settings)[:2]
+    flexible = [name for name, member in scene.members.items() if member.type == "flexible"]
+    found = PlainCases(scene, arguments, results, settings, mesh, assembly, chosen_places(flexible, places or {}))
+    return found.why or found
+
+
+def _extraordinary(scene: Scene, settings: Settings) -> str:
+    """What makes no case of a scene plain, in a few words."""
+    asked = {
+        "an analysis that is not static": scene.analysis.type != "static",
+        "several steps": len(scene.analysis.steps) != 1,
+        "a search for all equilibria": scene.analysis.equilibria != "one",
+        "contact": bool(scene.contacts),
+        "stops or tendons that may be slack": scene.stopped,
+        "friction of tendons": any(tendon.friction is not None for tendon in scene.tendons.values()),
+        "laws with memory": scene.remembers,
+        "laws with limits": scene.limited or scene.limited_on_ways,
+        "histories": bool(scene.histories),
+        "tubes": bool(scene.tubes),
+        "rotating axes": scene.rotating is not None,
+        "relaxation": any(section.relaxation for section in scene.sections.values()),
+        "start places": scene.started,
+        "accuracy of a single quantity": bool(settings.accuracy_of or scene.analysis.accuracy_of),
+        "a number of elements that is asked for": bool(
+            settings.elements or any(member.elements for member in scene.members.values())
+        ),
+    }
+    return next((what for what, is_so in asked.items() if is_so), "")
+
+
+class PlainCases:
+    """Cases of one scene, ready to be solved.
+
+    Parameters
+    ----------
+    scene, arguments, results, settings, places
+        As of :func:`plain_cases`.
+    mesh, assembly
+        Of the coarsest model.
+
+    Attributes
+    ----------
+    why : str
+        What makes no case plain, in a few words; else empty.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        arguments: Sequence[Argument],
+        results: Sequence[str],
+        settings: Settings,
+        mesh: Mesh,
+        assembly: Any,
+        places: Mapping[str, Sequence[float]],
+    ) -> None:
+        self.scene, self._arguments, self._results, self._places = scene, tuple(arguments), tuple(results), places
+        self.accuracy = settings.accuracy or scene.analysis.accuracy
+        self._assembly, self._levels, self._lock = assembly, list[_Level](), threading.Lock()
+        self._meshes = [mesh]
+        for _ in range(MESHES - 1):
+            self._meshes.append(self._meshes[-1].refined())
+        self._first = self._model(mesh)
+        self.why = self._extraordinary(Prepared(self._first))
+
+    def _model(self, mesh: Mesh) -> Model:
+        like = self._levels[0].model.scales if self._levels else None
+        return assemble(self.scene, mesh, assembly=self._assembly, scales=like)
+
+    def _extraordinary(self, prepared: Prepared) -> str:
+        model, loading = prepared.model, prepared.model.loading(self.scene.analysis.steps[0])
+        equations = prepared.equations
+        if not model.has_potential or not model.minimisable:
+            return "loads without potential"
+        if model.loaded_at_zero or loading.turned or model.unwrapping.driven:
+            return "loads at factor zero" if model.loaded_at_zero else "rotations that are prescribed"
+        if equations.apart() is None:
+            return NO_CORE
+        if prepared.diagnosis.mobility:
+            return "a mechanism"
+        if equations.rows:
+            prepared.correct(equations.start(model.loading(0.0)), model.loading(0.0))
+        if equations.redundant or prepared.lacks_slack:
+            return "redundant closings"
+        if prepared._test.counting() is None:
+            return "places that slide"
+        return "rotations that are prescribed" if "turn" in self._level(0).arguments.program.sizes else ""
+
+    def _level(self, number: int) -> _Level:
+        """The cases on one of the meshes; those after the second are seldom needed."""
+        # Threads share them.
+        with self._lock:
+            while len(self._levels) <= number:
+                model = self._model(self._meshes[len(self._levels)]) if self._levels else self._first
+                coarser = self._levels[-1].model if self._levels else None
+                more = (self.scene, model, self._arguments, self._results, self._places, self._meshes[0], coarser)
+                self._levels.append(_Level(*more))
+            return self._levels[number]
+
+    @property
+    def sizes(self) -> list[int]:
+        """How many numbers each result has."""
+        return [one.size for one in self._level(0).results.results]
+
+    def solve(
+        self,
+        values: Array,
+        *,
+        warm: bool = False,
+        threads: int = 1,
+        progress: Callable[[int], object] | None = None,
+    ) -> PlainAnswers:
+        """Solve cases with values (cases, numbers) in the units of the scene.
+
+        Parameters
+        ----------
+        warm : bool
+            Whether a case begins at the nearest one that was solved before, among a few hundred.
+        threads : int
+        progress : callable, optional
+            Called with the number of cases that turned out to be plain since the last call.
+        """
+        count, width = len(values), sum(self.sizes)
+        found = PlainAnswers(np.zeros(count, dtype=bool), np.full((count, width), np.nan), *np.full((3, count), np.nan))
+        parts = np.split(np.arange(count), range(CHUNK, count, CHUNK))
+
+        def solved(part: Index) -> tuple[Index, PlainAnswers]:
+            return part, self._chunk(values[part], nearest_before(values[part]) if warm else None)
+
+        with ThreadPoolExecutor(threads) as pool:
+            running = [pool.submit(solved, part) for part in parts]
+            try:
+                for future in as_completed(running):
+                    part, own = future.result()
+                    for name in ("known", "numbers", "errors", "residuals", "seconds"):
+                        getattr(found, name)[part] = getattr(own, name)
+                    if progress is not None:
+                        progress(int(own.known.sum()))
+            except KeyboardInterrupt:
+                arrived()
+                for future in running:
+                    future.cancel()
+                return replace(found, interrupted=True)
+        return found
+
+    def _chunk(self, values: Array, near: Array | None) -> PlainAnswers:
+        """Solve cases together; ``near`` (cases,) are numbers of cases before, from which they begin, -1 for none."""
+        begin = time.perf_counter()
+        count, first = len(values), self._level(0)
+        accepted = first.arguments.accepted(values)
+        chosen = np.flatnonzero(accepted)
+        if near is not None:
+            # Numbers among those that are accepted.
+            place = np.append(np.cumsum(accepted) - 1, -1)
+            near = place[np.where(accepted[near], near, -1)][chosen]
+        numbers = np.full((count, first.results.size), np.nan)
+        errors, residuals, known = np.full(count, np.nan), np.full(count, np.nan), np.zeros(count, dtype=bool)
+        states, residuals[chosen], found = first.followed(values[chosen], near)
+        chosen, here = chosen[found], states[found]
+        p = values[chosen]
+        shape, rough = first.seen(p, here)
+        for number in range(MESHES - 1):
+            if not len(chosen):
+                break
+            finer = self._level(number + 1)
+            begun = finer.begun_at(here)
+            there, left, found = finer.corrected(p, begun)
+            turned = finer.distance(begun, there)
+            finer_shape, finer_rough = finer.seen(p, there)
+            apart = (finer_shape - shape).reshape(len(p), -1, 3)
+            difference = np.linalg.norm(apart, axis=2).max(axis=1, initial=0.0) / self.scene.size
+            error = remaining(difference, gain(rough, finer_rough, finer.model.element.order))
+            good = found & (turned <= DRIFT)
+            smooth = finer_rough <= LEFT_ALONE * TORN
+            done = good & smooth & (error <= LEFT_ALONE * self.accuracy)
+            if done.any():
+                rows = chosen[done]
+                told = finer.told(p[done], there[done])
+                fine = np.isfinite(told).all(axis=1)
+                known[rows[fine]] = True
+                numbers[rows[fine]], errors[rows[fine]] = told[fine], error[done][fine]
+                residuals[rows] = left[done]
+            going = good & ~done
+            chosen, here, p = chosen[going], there[going], p[going]
+            shape, rough = finer_shape[going], finer_rough[going]
+        seconds = np.full(count, (time.perf_counter() - begin) / max(count, 1))
+        return PlainAnswers(known, numbers, errors, residuals, seconds)
+
+
+class _Level:
+    """The cases on one mesh; ``coarser`` is the model on the one before."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        model: Model,
+        arguments: Sequence[Argument],
+        results: Sequence[str],
+        places: Mapping[str, Sequence[float]],
+        coarsest: Mesh,
+        coarser: Model | None,
+    ) -> None:
+        self.model, self._coarsest = model, coarsest
+        self.results = Results(model, results, places)
+        self.arguments = Arguments(scene, model, arguments, self.results, "plain_", needed=False)
+        self.prepared = Prepared(self.arguments.model)
+        self.states = self.arguments.program.states
+        equations, parts = self.prepared.equations, self.arguments.program.sizes
+        self._zero = self.arguments.program.flat(equations.start(model.loading(0.0)))
+        self._p = ca.MX.sym("arguments", self.arguments.size)
+        named = [("stiffness", "tangent", "compliance"), *((f"data_{i}",) for i in range(len(model.connections)))]
+        # Numbers of the groups whose data vary; elements are the first.
+        self._varying = [i for i, own in enumerate(named) if any(name in parts for name in own)]
+        self._rows = self._of_rows()
+        rest = self.arguments.undeformed(self._p)
+        self.told = self._told_by(self.results.expression(self.arguments.program, rest))
+        self._shape = self._of_shape()
+        self.begun_at = _Refining(coarser or model, model)
+        self._numbers = self.prepared.weight, self.prepared._test.softest
+
+    # -- functions ------------------------------------------------------------------------------------
+
+    def _of_rows(self) -> Many:
+        """(arguments) -> data that vary, then what is given, as the core takes them."""
+        program, expressions, positions = self.arguments.program, self.arguments.expressions, self.model.positions
+        given = program.given_by(self.arguments.given(self._p))
+        data = [expressions.data(0, given, ca.MX()) if i == 0 else given.data[i - 1] for i in self._varying]
+        equations = self.prepared.equations
+        beside = ca.MX.zeros(equations.total)
+        if equations.displacement_unknowns:
+            beside[equations.rotation_unknowns : equations.unknowns] = -times(positions.Y.T, given.force)
+        parts = [*data, given.pull, *given.loads, times(positions.B, given.shift), times(positions.BZ, given.shift)]
+        parts += [beside, given.force]
+        return Many(ca.Function("rows", [self._p], [ca.densify(ca.vertcat(*(ca.vec(part) for part in parts)))]))
+
+    def _told_by(self, expression: ca.MX) -> Many:
+        """A function of arguments and state, of an expression of the program."""
+        program, state = self.arguments.program, ca.MX.sym("state", self.arguments.program.states)
+        p = self._p
+        inner = ca.Function("inner", [p, program.state_symbol, program.symbol], [ca.densify(expression)])
+        return Many(ca.Function("told", [p, state], [inner(p, state, self.arguments.given(p))]))
+
+    def _of_shape(self) -> Many:
+        """(arguments, state) -> displacements (m) of nodes and of places within elements, and roughness."""
+        model, places = self.model, dict[str, tuple[float, ...]]()
+        for name, member in model.scene.members.items():
+            if member.type == "flexible":
+                cuts = self._coarsest.cuts[name]
+                within = (cuts[:-1, None] + np.diff(cuts)[:, None] * WITHIN).ravel()
+                places[name] = (*within.tolist(), float(cuts[-1]))
+        # Of rigid members it is their nodes that move farthest.
+        names = [*(f"members.{name}.position" for name in places), *(f"nodes.{name}.position" for name in model.nodes)]
+        shown = Results(model, names, places)
+        moved = shown.expression(self.arguments.program, ca.MX.zeros(len(shown.rest(model))))
+        return self._told_by(ca.vertcat(moved, self._roughness()))
+
+    def _roughness(self) -> ca.MX:
+        """Largest of :func:`~sfetcas.mechanics.accuracy.roughness`."""
+        program, expressions, model = self.arguments.program, self.arguments.expressions, self.model
+        element = model.element
+        if not expressions.elements:
+            return ca.MX(0)
+        q, y, _, _ = program.parts
+        turns = model.rotations.turns
+        tail = ca.DM(interpolation.legendre_tail(element.nodes))
+        width = q.shape[0]
+        by_element = ca.reshape(q[:, turns.ravel().tolist()], width * turns.shape[1], len(turns))
+        mixing = ca.kron(tail.T, ca.DM.eye(width))
+        angles = ca.sqrt(ca.sum1(ca.mtimes(mixing, by_element) ** 2))
+        tangents = expressions.tangents(q, expressions.retained_places(y, program.given), program.given)
+        points = ca.DM(interpolation.legendre_tail(element.points) / element.weights)
+        axes = expressions.axes
+        by_element = ca.reshape(tangents, axes * expressions.points, len(turns))
+        chord = ca.sqrt(ca.sum1(ca.mtimes(ca.kron(points.T, ca.DM.eye(axes)), by_element) ** 2))
+        chord = chord * (model.scales.length / model.scene.size)
+        return ca.mmax((2.0 if model.space else 1.0) * angles + chord)
+
+    def seen(self, p: Array, states: Array) -> tuple[Array, Array]:
+        """Displacements (cases, 3 places), m, and largest roughness (cases,) of states."""
+        found = self._shape(p, states)
+        return found[:, :-1], found[:, -1]
+
+    # -- solving --------------------------------------------------------------------------------------
+
+    def distance(self, one: Array, other: Array) -> Array:
+        """Largest rotations (cases,), rad, between states."""
+        components = self.model.element.components
+        n = components * len(self.model.rotations.kind)
+        a, b = (part[:, :n].reshape(len(part), -1, components) for part in (one, other))
+        if not self.model.space:
+            return np.abs(a - b).max(axis=(1, 2), initial=0.0)
+        cosine = np.abs(np.einsum("cni,cni->cn", a, b)).clip(0.0, 1.0)
+        return np.asarray(2.0 * np.arccos(cosine.min(axis=1, initial=1.0)))
+
+    def followed(self, p: Array, near: Array | None) -> tuple[Array, Array, Array]:
+        """States, residuals, and which were found, of loads that grow from zero or from near cases."""
+        rows = self._rows(p)
+        states = np.repeat(self._zero[None, :], len(p), axis=0)
+        return self._solved(rows, states, near, follows=True)
+
+    def corrected(self, p: Array, states: Array) -> tuple[Array, Array, Array]:
+        """States, residuals, and which were found, from states beside them."""
+        return self._solved(self._rows(p), states.copy(), None, follows=False)
+
+    def _solved(self, rows: Array, states: Array, near: Array | None, *, follows: bool) -> tuple[Array, Array, Array]:
+        prepared, equations = self.prepared, self.prepared.equations
+        apart, counting = equations.apart(), prepared._test.counting()
+        assert apart is not None
+        assert counting is not None
+        core, system = apart
+        way, on_way = plain_way()
+        from_near = Limits(iterations=25, most=1.5)
+        limits = [limits_for_core(equations, one, prepared.weight) for one in (on_way, from_near)]
+        found, residuals = np.zeros(len(rows), np.intc), np.zeros(len(rows))
+        longest, stiffer = self._longest(rows), self._stiffer(rows)
+        begun = None if near is None else integers(near)
+        rows, zero = doubles(rows), doubles(self._zero)
+        cases = Cases(
+            cases=len(rows),
+            done=0,
+            row=rows.ctypes.data,
+            zero=zero.ctypes.data,
+            near=None if begun is None else begun.ctypes.data,
+            longest=longest.ctypes.data,
+            stiffer=stiffer.ctypes.data,
+            state=states.ctypes.data,
+            found=found.ctypes.data,
+            residual=residuals.ctypes.data,
+        )
+        both = (limits[0][0], limits[1][0])
+        core.solve_cases(system, cases, way if follows else None, both, counting[0], self._varying)
+        return states, residuals, found > 0
+
+    def _longest(self, rows: Array) -> Array:
+        """The longest step (cases,) of the way of each case, which depends on how far motions lead."""
+        model = self.model
+        end = rows.shape[1] - 2 * self._places - self.prepared.equations.total - len(model.positions.rows)
+        travel = np.abs(rows[:, end : end + self._places]).max(axis=1, initial=0.0)
+        return np.asarray(1.0 / np.clip(travel / TRAVEL, 1.0, FARTHEST))
+
+    @property
+    def _places(self) -> int:
+        return len(self.model.segments.places) * self.model.element.axes
+
+    def _stiffer(self, rows: Array) -> Array:
+        """By how much members are stiffer (cases,) than those of the scene, at most: eigenvalues are larger by that."""
+        base = np.linalg.norm(self.model.beams.stiffness, axis=2)
+        if 0 not in self._varying or not (base > 0.0).any():
+            return np.ones(len(rows))
+        element = self.model.element
+        own = rows[:, : len(base) * element.sizes[3]].reshape(len(rows), len(base), -1)
+        own = own[:, :, : base.shape[1] * element.stiffnesses].reshape(len(rows), *base.shape, -1)
+        sizes = np.linalg.norm(own, axis=3)[:, base > 0.0] / base[base > 0.0]
+        return np.ascontiguousarray(sizes.max(axis=1))
+
+
+def nearest_before(values: Array) -> Index:
+    """For each row (rows, numbers) a near one before it, -1 for the first; columns count over their range."""
+    from scipy.spatial import KDTree
+
+    spread = np.ptp(values, axis=0)
+    scaled = values / np.where(spread > 0.0, spread, 1.0)
+    found = np.full(len(values), -1, dtype=np.intp)
+    # Trees of 1, 2, 4, ... rows, each for as many that come after: few trees, and a nearest one is among many.
+    for first in 2 ** np.arange(int(np.ceil(np.log2(max(len(values), 2))))):
+        part = slice(first, 2 * first)
+        if len(scaled[part]):
+            found[part] = KDTree(scaled[:first]).query(scaled[part])[1]
+    return found
+
+
+class _Refining:
+    """States of one model on the next finer mesh, of many at once."""
+
+    def __init__(self, source: Model, target: Model) -> None:
+        self._source, self._target = source, target
+        n, m = len(source.rotations.kind), len(target.rotations.kind)
+        turn = np.zeros((m, n))
+        for name, ends in target.rotations.ends.items():
+            for there, here in zip(ends, source.rotations.ends[name], strict=True):
+                turn[there] = np.eye(n)[here]
+        for name in target.members:
+            at = Stations(source.element, source.mesh.cuts[name], target.along(name))
+            turns = source.rotations.turns[source.elements_of(name)][at.elements]
+            chain = target.chain(name)
+            turn[chain] = 0.0
+            for k in range(turns.shape[1]):
+                turn[chain, turns[:, k]] += at.nodal[:, k]
+        for name, number in target.rotations.node_turn.items():
+            own = source.rotations.node_turn[name]
+            if number is not None and own is not None:
+                turn[number] = np.eye(n)[own]
+        self._turn = turn
+        sizes = [len(source.positions.unknowns), len(source.row_names), source.unwrapping.count]
+        self._bounds = np.cumsum([source.element.components * n, *sizes]).tolist()
+        self._others = self._probed(sizes)
+
+    def _probed(self, sizes: list[int]) -> Array:
+        """Displacements, multipliers and angles of the target, (numbers, numbers of the source), which are linear."""
+        q = np.zeros((len(self._source.rotations.kind), self._source.element.components))
+        if self._source.space:
+            q[:, 0] = 1.0
+        columns = list[Array]()
+        for unit in np.eye(sum(sizes)):
+            y, lam, unwrapped = np.split(unit, np.cumsum(sizes)[:-1])
+            found = transferred(self._source, State(q, y, lam, unwrapped), self._target)
+            columns.append(np.concatenate([found.y, found.lam, found.unwrapped]))
+        count = len(self._target.positions.unknowns) + len(self._target.row_names) + self._target.unwrapping.count
+        return np.array(columns).reshape(sum(sizes), count).T
+
+    def __call__(self, states: Array) -> Array:
+        components = self._source.element.components
+        q = states[:, : self._bounds[0]].reshape(len(states), -1, components)
+        there = np.einsum("ij,cjk->cik", self._turn, q)
+        if self._source.space:
+            there /= np.linalg.norm(there, axis=2, keepdims=True)
+        others = states[:, self._bounds[0] :] @ self._others.T
+        return np.ascontiguousarray(np.concatenate([there.reshape(len(states), -1), others], axis=1))

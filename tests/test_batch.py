@@ -1,0 +1,246 @@
+"""Many cases at once by the core: the answers of single solves, what is left to these, order, threads, bad input."""
+
+import csv
+from concurrent.futures import Executor, Future
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import arch, cantilever, made
+
+from sfetcas import Analysis, Expect, SceneError, dump, load, parametric, solve, sweep
+from sfetcas.checks import asked
+from sfetcas.cli import main
+from sfetcas.mathematics.core import core
+from sfetcas.parametric import plain
+
+PROBLEMS = Path(__file__).parent.parent / "problems"
+ACCURACY = 1e-6
+
+
+@pytest.fixture(autouse=True)
+def library():
+    if core() is None:
+        pytest.skip("no core here, and no compiler that makes one")
+
+
+class Here(Executor):
+    """Does everything at once, by itself."""
+
+    def submit(self, fn, /, *args, **kwargs):
+        future = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+def beam(value=(0.0, 1.0), **more):
+    """A cantilever of length and stiffness one under a force at its end."""
+    return made(cantilever(value, analysis={"accuracy": ACCURACY}, **more))
+
+
+def of(name, **more):
+    return load(PROBLEMS / f"{name}.toml").replace({"analysis.steps": [1.0], "analysis.accuracy": ACCURACY, **more})
+
+
+def drawn(ranges, count=6, seed=0):
+    rng = np.random.default_rng(seed)
+    return {name: rng.uniform(*span, count) for name, span in ranges.items()}
+
+
+SCENES = {
+    "plane": (beam, {"loads.tip.value.1": (-12.0, 12.0), "sections.s.EI3": (0.7, 1.5)}, ["nodes.B.position"]),
+    "closed": (
+        lambda: made({**arch(), "analysis": {"accuracy": ACCURACY}}),
+        {"loads.down.value.0": (0.0, 6.0), "sections.s.EI3": (0.9, 1.2)},
+        ["members.m.position at 0.3", "reactions.A.force"],
+    ),
+    "space": (
+        lambda: of("bend_45_degrees"),
+        {"loads.tip.value.2": (10.0, 600.0), "sections.square.GJ": (7e5, 9e5)},
+        ["nodes.tip.position", "reactions.root.force"],
+    ),
+    "tendons": (
+        lambda: of("tendon_robot_along"),
+        {"tendons.short.tension": (0.1, 4.0), "tendons.long.tension": (0.1, 4.0)},
+        ["nodes.tip.position"],
+    ),
+    "discs": (lambda: of("tendon_robot_discs"), {"sections.wire.E": (4e10, 6e10)}, ["nodes.tip.position"]),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_answers_are_those_of_single_solves(name):
+    make, ranges, quantities = SCENES[name]
+    scene, cases = make(), drawn(ranges)
+    found, single = sweep(scene, cases, quantities, batch=True), sweep(scene, cases, quantities, executor=Here())
+    assert not found.outcomes.own
+    assert (found.table["status"] == "solved").all()
+    errors = found.table["error_estimate"]
+    assert (errors <= plain.LEFT_ALONE * ACCURACY).all()
+    for quantity in quantities:
+        mine, other = found.quantities[quantity], single.quantities[quantity]
+        size = scene.size if "position" in quantity else float(np.abs(other).max())
+        # Each is as far from the truth as it says of itself, and forces follow from positions.
+        apart = np.linalg.norm(mine - other, axis=1) / size
+        assert (apart <= 4.0 * (errors + single.table["error_estimate"])).all()
+
+
+def test_error_estimates_are_those_of_a_mesh_with_half_the_elements():
+    """With the answer far below its own error known from another solve."""
+    # A place within an element: at their ends positions are more accurate.
+    scene, force, place = beam(), [3.0, 10.0], "members.m.position at 0.33"
+    found = sweep(scene, {"loads.tip.value.1": force}, [place], batch=True)
+    for i, value in enumerate(force):
+        exact = solve(scene.replace({"loads.tip.value.1": value}), accuracy=1e-11)
+        error = float(np.linalg.norm(found.quantities[place][i] - asked(exact, Expect(quantity=place, value=True))))
+        assert error <= found.table["error_estimate"][i]
+        # Safety and places elsewhere, where the error is largest.
+        assert found.table["error_estimate"][i] <= 100.0 * error
+
+
+def test_what_is_not_plain_is_solved_by_itself():
+    """Beyond the load at which Lee's frame snaps, at which single solves say so; below it is plain."""
+    scene = load(PROBLEMS / "lee_frame.toml").replace({"analysis": Analysis(accuracy=ACCURACY), "expect": ()})
+    # The largest load that it carries is 1.856.
+    cases, quantity = {"loads.load.value.1": [-1.0, -1.8, -1.85, -1.9, -3.0]}, ["nodes.load.position"]
+    found, single = (sweep(scene, cases, quantity, executor=Here(), batch=batch) for batch in (True, False))
+    assert sorted(found.outcomes.own) == [3, 4]
+    for i in (3, 4):
+        assert found.outcomes[i].numbers[0].tolist() == single.outcomes[i].numbers[0].tolist()
+        assert "jumped" in found.outcomes[i].notes
+
+
+def test_columns_near_and_beyond_their_critical_load_are_left():
+    """An eigenvalue that is zero to rounding, and a way that buckles, are no case for the core."""
+    critical = np.pi**2 / 4.0
+    cases = {"loads.tip.value.0": -critical * np.array([0.5, 1.0 - 1e-9, 1.0, 1.2])}
+    found = sweep(beam((-1.0, 0.0)), cases, ["nodes.B.position"], batch=True)
+    assert sorted(found.outcomes.own) == [1, 2, 3]
+    assert np.abs(found.quantities["nodes.B.position"][0] - [1.0, 0.0, 0.0]).max() <= ACCURACY
+
+
+def test_order_and_threads_change_no_bit(monkeypatch):
+    monkeypatch.setattr(plain, "CHUNK", 8)
+    scene, cases = beam(), drawn(SCENES["plane"][1], count=30)
+    one = sweep(scene, cases, ["nodes.B.position"], batch=True, workers=1)
+    order = np.random.default_rng(1).permutation(30)
+    mixed = {name: column[order] for name, column in cases.items()}
+    two = sweep(scene, mixed, ["nodes.B.position"], batch=True, workers=3)
+    for key in ("nodes.B.position", "error_estimate"):
+        assert one.values(key)[order].tolist() == two.values(key).tolist()
+
+
+def test_warm_starts_lead_to_the_same_where_there_is_one_equilibrium(monkeypatch):
+    monkeypatch.setattr(plain, "CHUNK", 16)
+    scene, cases = beam(), drawn({"loads.tip.value.1": (-4.0, 4.0)}, count=40)
+    cold, warm = (sweep(scene, cases, ["nodes.B.position"], batch=True, warm=warm) for warm in (False, True))
+    assert not warm.outcomes.own
+    # Newton's method goes down to rounding from anywhere; softness of 1e-12 is what is left.
+    assert np.abs(cold.values("nodes.B.position") - warm.values("nodes.B.position")).max() <= 1e-10
+
+
+def test_nearest_of_those_before():
+    values = np.array([[0.0, 0.0], [1.0, 0.0], [0.1, 0.0], [0.9, 1.0], [0.12, 0.0]])
+    found = plain.nearest_before(values)
+    assert found.tolist() == [-1, 0, 0, 1, 2]
+    assert plain.nearest_before(np.ones((1, 2))).tolist() == [-1]
+    rows = np.random.default_rng(0).normal(size=(100, 3))
+    assert (plain.nearest_before(rows)[1:] < np.arange(1, 100)).all()
+
+
+REFUSED = {
+    "contact": ("floor_heavy_cantilever", "tip"),
+    "loads without potential": ("cantilever_follower_force", "tip"),
+    "histories": ("portal_frame", "left"),
+}
+
+
+@pytest.mark.parametrize("why", REFUSED)
+def test_scenes_without_plain_cases_are_refused_with_a_sentence(why):
+    name, node = REFUSED[why]
+    scene = of(name, expect=[])
+    section = next(iter(scene.sections))
+    key = "EI3" if getattr(scene.sections[section], "EI3", None) else "E"
+    with pytest.raises(SceneError, match=rf"^batch: found {why}, accepted: such a scene in a sweep without batch"):
+        sweep(scene, {f"sections.{section}.{key}": [1.0, 2.0]}, [f"nodes.{node}.position"], batch=True)
+
+
+def test_bad_input_is_one_sentence():
+    scene, cases = beam(), {"loads.tip.value.1": [1.0]}
+    with pytest.raises(SceneError, match="warm: found True without a batch"):
+        sweep(scene, cases, ["nodes.B.position"], warm=True)
+    with pytest.raises(SceneError, match="quantities"):
+        sweep(scene, cases, ["certificate.residual"], batch=True)
+
+
+def test_values_out_of_range_are_refused_as_by_single_solves():
+    scene, cases = beam(), {"sections.s.EI3": [-1.0, 1.0]}
+    found, single = (sweep(scene, cases, ["nodes.B.position"], executor=Here(), batch=batch) for batch in (True, False))
+    assert found.outcomes[0].status == single.outcomes[0].status == "refused"
+    assert found.outcomes[0].reason == single.outcomes[0].reason
+    assert found.failures[0].case == 0
+    assert found.outcomes[1].status == "solved"
+
+
+def test_without_a_core_cases_are_solved_one_by_one(monkeypatch):
+    monkeypatch.setenv("SFETCAS_CORE", "off")
+    scene, cases = beam(), {"loads.tip.value.1": [1.0, 2.0]}
+    found = sweep(scene, cases, ["nodes.B.position"], executor=Here(), batch=True)
+    assert sorted(found.outcomes.own) == [0, 1]
+    assert found.solved.all()
+
+
+def test_command_and_table(tmp_path, capsys):
+    dump(beam(), tmp_path / "beam.toml")
+    out = tmp_path / "cases.csv"
+    arguments = ["sweep", str(tmp_path / "beam.toml"), "--vary", "loads.tip.value.1=0:10:5", "--batch", "--warm"]
+    assert main([*arguments, "--out", str(out)]) == 0
+    assert "5 cases of loads.tip.value.1: 5 solved" in capsys.readouterr().out
+    rows = list(csv.DictReader(out.read_text().splitlines()))
+    assert [row["status"] for row in rows] == ["solved"] * 5
+    assert float(rows[0]["nodes.B.position.0"]) == 1.0
+
+
+def test_many_values_of_parameters():
+    scene = beam()
+    equilibrium = parametric(scene, ["loads.tip.value", "sections.s.EI3"], ["nodes.B.position", "energy.elastic"])
+    forces = np.array([[0.0, 1.0], [1.0, -3.0], [0.0, 0.0]])
+    told = []
+    found = equilibrium.many({"loads.tip.value": forces, "sections.s.EI3": [1.0, 2.0, 1.0]}, progress=told.append)
+    assert sum(told) == len(found) == 3
+    assert not found.failures
+    for i, force in enumerate(forces):
+        single = equilibrium.solve({"loads.tip.value": force, "sections.s.EI3": [1.0, 2.0, 1.0][i]})
+        assert np.abs(found["nodes.B.position"][i] - single["nodes.B.position"]).max() <= ACCURACY
+        assert abs(found["energy.elastic"][i] - single["energy.elastic"]) <= 1e-4 * max(1.0, single["energy.elastic"])
+    assert "3 cases, 3 solved" in repr(found)
+
+
+def test_many_values_where_nothing_is_plain_are_solved_one_by_one():
+    scene = of("floor_heavy_cantilever", expect=[])
+    section = next(iter(scene.sections))
+    equilibrium = parametric(scene, [f"sections.{section}.EI3"], ["nodes.tip.position"])
+    default = float(equilibrium.defaults[f"sections.{section}.EI3"])
+    found = equilibrium.many({f"sections.{section}.EI3": [default, -1.0]})
+    assert np.isnan(found.errors).all()
+    assert list(found.failures) == [1]
+    assert "accepted: above zero" in found.failures[1]
+    assert found["nodes.tip.position"][0].tolist() == equilibrium.solve()["nodes.tip.position"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"loads.other.value": [1.0]}, "values: found 'loads.other.value', accepted: loads.tip.value.1"),
+        ({"loads.tip.value.1": [1.0, np.nan]}, r"values.loads.tip.value.1: found \[1.0, nan\], accepted: finite"),
+        (
+            {"loads.tip.value.1": [[1.0, 2.0]]},
+            r"found an array of shape \(1, 2\), accepted: finite numbers in an array",
+        ),
+        ({"loads.tip.value.1": "much"}, "accepted: finite numbers"),
+    ],
+)
+def test_many_values_that_are_none(values, message):
+    equilibrium = parametric(beam(), ["loads.tip.value.1"], ["nodes.B.position"])
+    with pytest.raises(SceneError, match=message):
+        equilibrium.many(values)
