@@ -38,6 +38,13 @@ def beam(value=(0.0, 1.0), **more):
     return made(cantilever(value, analysis={"accuracy": ACCURACY}, **more))
 
 
+def turned(more):
+    """An arch between clamps, one of which moves."""
+    scene = {**arch(), "analysis": {"accuracy": ACCURACY}, **more}
+    scene["loads"]["down"]["value"] = [1.0, -3.0]
+    return scene
+
+
 def of(name, **more):
     return load(PROBLEMS / f"{name}.toml").replace({"analysis.steps": [1.0], "analysis.accuracy": ACCURACY, **more})
 
@@ -63,6 +70,23 @@ SCENES = {
         lambda: of("tendon_robot_along"),
         {"tendons.short.tension": (0.1, 4.0), "tendons.long.tension": (0.1, 4.0)},
         ["nodes.tip.position"],
+    ),
+    "turned": (
+        lambda: made(turned({"motions": {"m": {"node": "B", "rotation": 1.0, "displacement": [-0.2, 0.1]}}})),
+        {"motions.m.rotation": (-2.0, 2.0), "motions.m.displacement.1": (-0.2, 0.2), "sections.s.EI3": (0.9, 1.1)},
+        ["members.m.position at 0.4", "reactions.B.force"],
+    ),
+    "turned in space": (
+        lambda: made(
+            turned({"motions": {"m": {"node": "B", "rotation": [0.5, 0.4, 0.3], "displacement": [-0.2, 0, 0]}}})
+        ),
+        {"motions.m.rotation.0": (-1.0, 1.0), "motions.m.rotation.2": (-1.0, 1.0)},
+        ["members.m.position at 0.4", "reactions.B.force"],
+    ),
+    "linkage": (
+        lambda: of("fourbar_curved_coupler"),
+        {"factor": (-35.0, 40.0), "springs.return.stiffness": (2.0, 4.0)},
+        ["nodes.C.position"],
     ),
     "discs": (lambda: of("tendon_robot_discs"), {"sections.wire.E": (4e10, 6e10)}, ["nodes.tip.position"]),
 }

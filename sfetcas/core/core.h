@@ -210,9 +210,14 @@ typedef struct {
   int rounds;
 } sf_count_of;
 
-/* A way of loads and motions, and the limits of sfetcas/solvers/continuation.py. */
+/* A way of loads and motions, and the limits of sfetcas/solvers/continuation.py.
+ *
+ * After what is given come the vectors (turning, 3) of rotations that are prescribed.
+ */
 typedef struct {
   const double *begun, *rate; /* (given,) where it begins, NULL: nothing, and by the part of the way */
+  int turning;
+  const int *turned;          /* (turning,) numbers of these rotations */
   double done, step;          /* changed: the part that is done, the length of the next step */
   int tries;                  /* changed: steps that may still be tried */
   double longest, linear, unbalanced, still, shortest, least, brief;
@@ -220,7 +225,7 @@ typedef struct {
 
 /* Cases of one model. */
 typedef struct {
-  int cases, done;          /* done: changed */
+  int cases, done, follows; /* done: changed; follows: whether loads are followed from zero */
   int groups;               /* of terms with data that vary */
   const int *count;         /* (groups,) of how many numbers */
   double *const *datum;     /* (groups,) where the model has them */
@@ -234,6 +239,8 @@ typedef struct {
 } sf_cases;
 
 SF_PUBLIC int sf_follow_size(const sf_model *model);
+SF_PUBLIC int sf_negative(const sf_model *model, const sf_system *system, const double *entries,
+                          const sf_count_of *count, double *memory);
 SF_PUBLIC int sf_follow(const sf_model *model, sf_system *system, sf_way *way, const sf_limits *limits,
                         const sf_count_of *count, const double *tangent, sf_state *state, sf_point *point,
                         double *memory, sf_report *report);

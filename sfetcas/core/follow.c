@@ -63,12 +63,12 @@ static int sf_accurate(const sf_factors *f, const sf_count_of *count, const doub
   return now <= count->blurred * sqrt((double)n) || now < count->broken * before;
 }
 
-/* Whether all eigenvalues of the energy on the closings are clearly above zero; 0 where some are not, or nobody knows.
+/* Number of eigenvalues of the energy on the closings below a shift; -1 where factors do not tell.
  *
- * The signs of the pivots of the matrix with a border count those below a shift; see sfetcas/solvers/stability.py.
+ * The signs of the pivots of the matrix with a border count them; see sfetcas/solvers/stability.py.
  */
-static int sf_clear(const sf_model *m, const sf_system *system, const double *entries, const sf_count_of *count,
-                    sf_place *place) {
+static int sf_below(const sf_model *m, const sf_system *system, const double *entries, const sf_count_of *count,
+                    double shift, sf_place *place) {
   double size = 1.0, *matrix = place->matrix;
   int i, negative;
   sf_copy(matrix, entries, m->entry_count);
@@ -76,13 +76,46 @@ static int sf_clear(const sf_model *m, const sf_system *system, const double *en
     double own = fabs(entries[m->diagonal[i]]);
     if (i < m->rotation_unknowns && own > size) size = own;
     /* Where rounding hides small eigenvalues each mode is looked at by itself, which is not done here. */
-    if (count->weight[i] > 0.0 && !(own * count->rounding <= count->graded * count->weight[i])) return 0;
-    matrix[m->diagonal[i]] -= count->shift * count->weight[i];
+    if (count->weight[i] > 0.0 && !(own * count->rounding <= count->graded * count->weight[i])) return -1;
+    matrix[m->diagonal[i]] -= shift * count->weight[i];
     if (i >= m->rotation_unknowns) matrix[m->diagonal[i]] += count->soft * count->softest;
   }
   for (i = m->unknowns; i < m->total; ++i) matrix[m->diagonal[i]] -= count->soft / size;
-  if (sf_factorise(system->factors, matrix, &negative)) return 0;
-  return negative == m->rows && sf_accurate(system->factors, count, matrix, place);
+  if (sf_factorise(system->factors, matrix, &negative)) return -1;
+  return sf_accurate(system->factors, count, matrix, place) ? negative - m->rows : -1;
+}
+
+/* Whether all eigenvalues are clearly above zero; 0 where some are not, or nobody knows. */
+static int sf_clear(const sf_model *m, const sf_system *system, const double *entries, const sf_count_of *count,
+                    sf_place *place) {
+  return sf_below(m, system, entries, count, count->shift, place) == 0;
+}
+
+/* Number of negative eigenvalues where none is near to zero; -1 where one is, or nobody knows. */
+int sf_negative(const sf_model *m, const sf_system *system, const double *entries, const sf_count_of *count,
+                double *memory) {
+  sf_place place;
+  int above, below;
+  sf_make_place(m, memory, &place);
+  above = sf_below(m, system, entries, count, count->shift, &place);
+  /* Usual are equilibria with none at all. */
+  if (above <= 0) return above;
+  below = sf_below(m, system, entries, count, -count->shift, &place);
+  return above == below ? above : -1;
+}
+
+/* The state with prescribed rotations as they are at a part of the way. */
+static void sf_hold(const sf_model *m, const sf_way *way, double part, sf_state *state) {
+  int i, k;
+  for (i = 0; i < way->turning; ++i) {
+    size_t at = (size_t)m->given + 3 * (size_t)i;
+    double turn[3];
+    for (k = 0; k < 3; ++k) turn[k] = (way->begun ? way->begun[at + k] : 0.0) + part * way->rate[at + k];
+    if (m->space)
+      sf_turned(turn, state->q + (size_t)4 * way->turned[i]);
+    else
+      state->q[way->turned[i]] = turn[2];
+  }
 }
 
 static void sf_give_part(const sf_model *m, const sf_way *way, double part, double *given) {
@@ -106,6 +139,7 @@ int sf_follow(const sf_model *m, sf_system *system, sf_way *way, const sf_limits
     int far, stuck, broken;
     sf_give_part(m, way, trial, place.given);
     sf_copy_state(m, state, &place.state);
+    sf_hold(m, way, trial, &place.state);
     broken = sf_correct(m, system, place.given, place.tangent, NULL, limits, &place.state, point, place.correcting,
                         report);
     if (broken) return broken;
@@ -137,14 +171,14 @@ static void sf_of_row(const sf_model *m, double *row, sf_state *state) {
 
 /* Equilibria of one model for many loads and data: rows of all data that vary, group by group, then of what is given.
  *
- * Each state begins as the one of a case before, or as it stands in its row where the cases begin near; where that does
- * not lead to one that is clearly stable, and there is a way, it is followed from zero loads.  Found are 1 for what was
+ * Each state begins as the one of a case before, or where nothing is followed as it stands in its row; where that does
+ * not lead to one that is clearly stable, it is followed from zero loads.  Found are 1 for what was
  * followed, 2 for what was near, 0 for what is left to the caller.  Returns 2 where factors have no room, with the
  * number of cases that are done in cases->done.
  */
 int sf_solve_cases(const sf_model *m, sf_system *system, sf_cases *cases, const sf_way *way, const sf_limits *limits,
                    const sf_limits *near_limits, const sf_count_of *count, sf_point *point, double *memory) {
-  int numbers = m->given, size = m->components * m->rotations + m->displacements + m->rows + m->angles, g, broken;
+  int numbers = m->given + 3 * way->turning, size = m->components * m->rotations + m->displacements + m->rows + m->angles, g, broken;
   sf_state state;
   sf_report report;
   sf_place place;
@@ -164,7 +198,12 @@ int sf_solve_cases(const sf_model *m, sf_system *system, sf_cases *cases, const 
     }
     sf_of_row(m, own, &state);
     if (before >= 0 && cases->found[before]) sf_copy(own, cases->state + (size_t)before * size, size);
-    if (!way || (before >= 0 && cases->found[before])) {
+    sf_way own_way = *way;
+    own_way.begun = NULL;
+    own_way.longest = cases->longest[i];
+    if (!cases->follows || (before >= 0 && cases->found[before])) {
+      own_way.rate = row;
+      sf_hold(m, &own_way, 1.0, &state);
       broken = sf_correct(m, system, row, NULL, NULL, near_limits, &state, point, place.correcting, &report);
       if (broken) return broken;
       if (report.good && sf_clear(m, system, point->entries, &counted, &place)) {
@@ -172,11 +211,8 @@ int sf_solve_cases(const sf_model *m, sf_system *system, sf_cases *cases, const 
         cases->residual[i] = report.residual;
       }
     }
-    if (way && !cases->found[i]) {
-      sf_way own_way = *way;
+    if (cases->follows && !cases->found[i]) {
       sf_copy(own, cases->zero, size);
-      own_way.begun = NULL;
-      own_way.longest = cases->longest[i];
       own_way.rate = row;
       sf_give_part(m, &own_way, 0.0, place.given);
       sf_at(m, &state, place.given, point);

@@ -213,6 +213,8 @@ class Way(ctypes.Structure):
 
     _fields_ = (
         *((name, _pointer) for name in ("begun", "rate")),
+        ("turning", _int),
+        ("turned", _pointer),
         *((name, _double) for name in ("done", "step")),
         ("tries", _int),
         *((name, _double) for name in ("longest", "linear", "unbalanced", "still", "shortest", "least", "brief")),
@@ -226,7 +228,7 @@ class Cases(ctypes.Structure):
     """``sf_cases``."""
 
     _fields_ = (
-        *((name, _int) for name in ("cases", "done", "groups")),
+        *((name, _int) for name in ("cases", "done", "follows", "groups")),
         *((name, _pointer) for name in NAMES_OF_CASES),
     )
 
@@ -307,6 +309,7 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL | None:
     library.sf_correct_size.argtypes = [_pointer]
     library.sf_correct.argtypes = [_pointer] * 10
     library.sf_follow_size.argtypes = [_pointer]
+    library.sf_negative.argtypes = [_pointer] * 5
     library.sf_follow.argtypes = [_pointer] * 10
     library.sf_solve_cases.argtypes = [_pointer] * 9
     library.sf_solve.argtypes = [_pointer, _pointer, _int, _pointer, _pointer, _pointer]

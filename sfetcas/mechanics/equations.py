@@ -469,6 +469,13 @@ class Equations:
         there, reached = self._core.follow(system, _arrays(state), doubles(tangent), way, limits, counting)
         return State(*there), reached
 
+    def clearly_negative(self, entries: Array, counting: Counting) -> int | None:
+        """Number of negative eigenvalues by the core; None without one, where one is near zero, or nobody knows."""
+        system = self.solver.of_core
+        if system is None or self._core is None:
+            return None
+        return self._core.negative(system, doubles(entries), counting)
+
     @property
     def by_core(self) -> bool:
         """Whether the core evaluates these equations."""

@@ -427,11 +427,17 @@ class CoreModel:
             system.make_room()
         return (q, y, lam, unwrapped), not ended
 
+    def negative(self, system: CoreSystem, entries: Array, counting: c.Counting) -> int | None:
+        """Number of negative eigenvalues of a matrix; None where one is near zero, or factors do not tell."""
+        addresses = (system.address, entries.ctypes.data, ctypes.addressof(counting), self._following.ctypes.data)
+        found = int(self._library.sf_negative(self._address, *addresses))
+        return None if found < 0 else found
+
     def solve_cases(
         self,
         system: CoreSystem,
         cases: c.Cases,
-        way: c.Way | None,
+        way: c.Way,
         limits: tuple[c.Limits, c.Limits],
         counting: c.Counting,
         varying: Sequence[int],
@@ -443,8 +449,8 @@ class CoreModel:
         system : CoreSystem
         cases : Cases
             Without what says where data that vary stand.
-        way : Way, optional
-            How loads are followed from zero; without it states are corrected alone.
+        way : Way
+            How loads are followed from zero, and which rotations are prescribed.
         limits : (Limits, Limits)
             Of corrections on the way, and from near states.
         counting : Counting
@@ -458,9 +464,8 @@ class CoreModel:
         counts = c.integers(np.array([part.size for part in data]))
         places = np.array([part.ctypes.data for part in data], dtype=np.uintp)
         cases.groups, cases.count, cases.datum = len(data), counts.ctypes.data, places.ctypes.data
-        followed = None if way is None else ctypes.addressof(way)
-        addresses = [ctypes.addressof(part) for part in (*limits, counting)]
-        rest = (ctypes.addressof(cases), followed, *addresses, self._scratch.address, self._following.ctypes.data)
+        addresses = [ctypes.addressof(part) for part in (cases, way, *limits, counting)]
+        rest = (*addresses, self._scratch.address, self._following.ctypes.data)
         while self._library.sf_solve_cases(self._address, system.address, *rest) == NO_ROOM:
             system.make_room()
 

@@ -31,6 +31,7 @@ from ..mechanics.equations import State
 from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
+from ..mechanics.rotations import RotationFreedom
 from ..mechanics.stations import Stations
 from ..solvers.continuation import FARTHEST, TRAVEL, plain_way
 from ..solvers.newton import Limits, limits_for_core
@@ -192,8 +193,10 @@ class PlainCases:
         equations = prepared.equations
         if not model.has_potential or not model.minimisable:
             return "loads without potential"
-        if model.loaded_at_zero or loading.turned or model.unwrapping.driven:
-            return "loads at factor zero" if model.loaded_at_zero else "rotations that are prescribed"
+        if model.loaded_at_zero:
+            return "loads at factor zero"
+        if not np.isnan(model.unwrapping.prescribed(model.rotations.kind, loading)).all():
+            return "angles that are counted and prescribed"
         if equations.apart() is None:
             return NO_CORE
         if prepared.diagnosis.mobility:
@@ -204,7 +207,9 @@ class PlainCases:
             return "redundant closings"
         if prepared._test.counting() is None:
             return "places that slide"
-        return "rotations that are prescribed" if "turn" in self._level(0).arguments.program.sizes else ""
+        # What it refuses is told before anything is solved.
+        self._level(0)
+        return ""
 
     def _level(self, number: int) -> _Level:
         """The cases on one of the meshes; those after the second are seldom needed."""
@@ -331,6 +336,9 @@ class _Level:
         named = [("stiffness", "tangent", "compliance"), *((f"data_{i}",) for i in range(len(model.connections)))]
         # Numbers of the groups whose data vary; elements are the first.
         self._varying = [i for i, own in enumerate(named) if any(name in parts for name in own)]
+        # Prescribed rotations, if motions turn any.
+        held = np.flatnonzero(self.model.rotations.kind == RotationFreedom.FIXED)
+        self._turned = integers(held if "turn" in parts else held[:0])
         self._rows = self._of_rows()
         rest = self.arguments.undeformed(self._p)
         self.told = self._told_by(self.results.expression(self.arguments.program, rest))
@@ -350,7 +358,8 @@ class _Level:
         if equations.displacement_unknowns:
             beside[equations.rotation_unknowns : equations.unknowns] = -times(positions.Y.T, given.force)
         parts = [*data, given.pull, *given.loads, times(positions.B, given.shift), times(positions.BZ, given.shift)]
-        parts += [beside, given.force]
+        turn = ca.reshape(given.turn, 3, len(self.model.rotations.kind))
+        parts += [beside, given.force, turn[:, self._turned.tolist()]]
         return Many(ca.Function("rows", [self._p], [ca.densify(ca.vertcat(*(ca.vec(part) for part in parts)))]))
 
     def _told_by(self, expression: ca.MX) -> Many:
@@ -429,6 +438,7 @@ class _Level:
         assert counting is not None
         core, system = apart
         way, on_way = plain_way()
+        way.turning, way.turned = len(self._turned), self._turned.ctypes.data
         from_near = Limits(iterations=25, most=1.5)
         limits = [limits_for_core(equations, one, prepared.weight) for one in (on_way, from_near)]
         found, residuals = np.zeros(len(rows), np.intc), np.zeros(len(rows))
@@ -438,6 +448,7 @@ class _Level:
         cases = Cases(
             cases=len(rows),
             done=0,
+            follows=follows,
             row=rows.ctypes.data,
             zero=zero.ctypes.data,
             near=None if begun is None else begun.ctypes.data,
@@ -448,15 +459,18 @@ class _Level:
             residual=residuals.ctypes.data,
         )
         both = (limits[0][0], limits[1][0])
-        core.solve_cases(system, cases, way if follows else None, both, counting[0], self._varying)
+        core.solve_cases(system, cases, way, both, counting[0], self._varying)
         return states, residuals, found > 0
 
     def _longest(self, rows: Array) -> Array:
         """The longest step (cases,) of the way of each case, which depends on how far motions lead."""
-        model = self.model
-        end = rows.shape[1] - 2 * self._places - self.prepared.equations.total - len(model.positions.rows)
+        model, turns = self.model, 3 * len(self._turned)
+        end = rows.shape[1] - turns - 2 * self._places - self.prepared.equations.total - len(model.positions.rows)
         travel = np.abs(rows[:, end : end + self._places]).max(axis=1, initial=0.0)
-        return np.asarray(1.0 / np.clip(travel / TRAVEL, 1.0, FARTHEST))
+        vectors = rows[:, rows.shape[1] - turns :].reshape(len(rows), -1, 3)
+        turned = np.linalg.norm(vectors, axis=2).max(axis=1, initial=0.0)
+        driven = np.clip(np.maximum(travel / TRAVEL, turned), 1.0, FARTHEST)
+        return np.asarray(1.0 / np.maximum(driven, turned if model.space else 0.0))
 
     @property
     def _places(self) -> int:

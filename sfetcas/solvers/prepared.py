@@ -16,7 +16,7 @@ from ..description.showing import shown
 from ..errors import SolveError, Status
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
-from ..mathematics.core import Way, doubles
+from ..mathematics.core import Way, integers
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt, NLPResult
 from ..mechanics.equations import Equations, Point, State
@@ -203,8 +203,13 @@ class Prepared:
         counting = self._test.counting() if counted else None
         if not equations.by_core or (equations.rows and equations.redundant) or (counted and counting is None):
             return None
-        begun, along = (doubles(equations.given(loading)) for loading in (begin.loading, rate))
+        turned = integers(np.flatnonzero(rate.turn.any(axis=1)))
+        begun, along = (
+            np.concatenate([equations.given(loading), loading.turn[turned].ravel()])
+            for loading in (begin.loading, rate)
+        )
         way.begun, way.rate = begun.ctypes.data, along.ctypes.data
+        way.turning, way.turned = len(turned), turned.ctypes.data
         controls, alive = limits_for_core(equations, limits, self._test.weight)
         found = equations.followed(begin.state, begin.point.entries, way, controls, counting and counting[0])
         del alive, counting

@@ -202,6 +202,9 @@ class StabilityTest:
         if self._n == 0:
             return 0
         point = self.equations.symmetric(point)
+        clear = self._clearly_negative(point)
+        if clear is not None:
+            return clear
         entries = self._weighted(point)
         limit = self._limit(entries)
         known = self._all(point, entries, limit)
@@ -303,6 +306,9 @@ class StabilityTest:
         if self._n == 0:
             return Inertia(0, 0)
         point = self.equations.symmetric(point)
+        clear = self._clearly_negative(point)
+        if clear is not None:
+            return Inertia(clear, 0)
         entries = self._weighted(point)
         limit = self._limit(entries)
         if self._is_bordered and self._n > DENSE and not self._is_graded(limit):
@@ -445,6 +451,14 @@ class StabilityTest:
     def _below_dense(self, point: Point, shift: float) -> int:
         values = np.linalg.eigvalsh(self._projected(self._weighted(point), self._rows(point))[0])
         return int((values[self._apart :] < shift).sum())
+
+    def _clearly_negative(self, point: Point) -> int | None:
+        """Number of negative eigenvalues where the core tells it and none is near zero; see :meth:`counting`."""
+        return None if self._counting is None else self.equations.clearly_negative(point.entries, self._counting[0])
+
+    @functools.cached_property
+    def _counting(self) -> tuple[Counting, Array] | None:
+        return self.counting() if self.equations.by_core and self.equations.model.has_potential else None
 
     def counting(self) -> tuple[Counting, Array] | None:
         """How the core tells that all eigenvalues are above :data:`CLEAR_OF_ZERO`, and an array that lives as long.
