@@ -681,6 +681,12 @@ class Equations:
         found[self.diagonal[self.unknowns :]] -= dual
         return found
 
+    @functools.cached_property
+    def jacobian_entries(self) -> tuple[Index, Index, Index]:
+        """Of the entries that are the Jacobian of the constraints their numbers, rows and unknowns, (n,) each."""
+        chosen = np.flatnonzero((self.row >= self.unknowns) & (self.column < self.unknowns))
+        return chosen, self.row[chosen] - self.unknowns, self.column[chosen]
+
     def of_rows(self, entries: Array) -> Array:
         """Entries of the Newton matrix that belong to the Jacobian of the constraints; zero in place of all others."""
         return np.where((self.row >= self.unknowns) != (self.column >= self.unknowns), entries, 0.0)

@@ -21,6 +21,7 @@ from ..description.showing import named, shown
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
+from ..mathematics.keeping import kept
 from .actuation import actuations_in
 from .beams import ELEMENT_DATA, Beams, Scales, beams_of, scales_of
 from .clearances import clearances_in
@@ -287,6 +288,8 @@ class Model:
         histories = self.scene.histories
         return {name: factor if name is None else histories[name].factor(factor) for name in self.groups}
 
+    # One factor is asked for several times in a row: by a step, its equations, and what comes after it.
+    @kept(4)
     def loading(self, factor: float, share: float = 1.0) -> Loading:
         """Loads and prescribed motions at a load factor, multiplied by ``share``; dimensionless."""
         parts = [(self.groups[name], share * value) for name, value in self.factors(factor).items()]

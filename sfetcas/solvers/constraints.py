@@ -270,9 +270,9 @@ def _nearest(equations: Equations, state: State, loading: Loading) -> tuple[Stat
 
     begin = moving.at(equations.holding(state, loading))
     here, _ = newton(begin, step, after, lambda here: False, DAMPED)
-    chosen = (equations.row >= n) & (equations.column < n)
     slope, gaps = np.zeros(n), here.point.residual[n:]
-    np.add.at(slope, equations.column[chosen], here.point.entries[chosen] * gaps[equations.row[chosen] - n])
+    chosen, row, column = equations.jacobian_entries
+    np.add.at(slope, column, here.point.entries[chosen] * gaps[row])
     return here.state, gaps, float(np.abs(slope).max(initial=0.0))
 
 

@@ -44,7 +44,6 @@ class TangentTest:
         masses = np.concatenate([equations.mass, np.full(equations.displacement_unknowns, LIGHT)])
         self._root = np.sqrt(softest * masses)
         self._in_h = np.flatnonzero((equations.row < n) & (equations.column < n))
-        self._in_a = np.flatnonzero((equations.row >= n) & (equations.column < n))
 
     def _tangent(self, point: Point) -> tuple[Array, float, int]:
         """The weighted tangent (n, n), the limit up to which eigenvalues count as zero, the size of the null space.
@@ -55,7 +54,8 @@ class TangentTest:
         equations, n = self._equations, self._equations.unknowns
         h, rows = np.zeros((n, n)), np.zeros((equations.rows, n))
         h[equations.row[self._in_h], equations.column[self._in_h]] = point.entries[self._in_h]
-        rows[equations.row[self._in_a] - n, equations.column[self._in_a]] = point.entries[self._in_a]
+        chosen, row, column = equations.jacobian_entries
+        rows[row, column] = point.entries[chosen]
         h /= np.outer(self._root, self._root)
         largest, free = float(np.abs(h).max(initial=0.0)), n
         if len(rows):

@@ -49,6 +49,8 @@ def _loose_rows(equations: Equations, point: Point, slack: float) -> Array:
     # A usual size of rows, so that a row without derivative is found also if it is the only one.
     # Without beams rows are of the size of one.
     usual = float((equations.model.beams.weight**2).sum()) or 1.0
+    if equations.rows <= MANY and _clearly_independent(equations, point, usual):
+        return np.zeros((equations.rows, 0))
     find = _smallest if equations.rows > MANY else _all_singular
     squares, left, largest = find(equations, point)
     small = left[:, squares < ROUGHLY * max(largest, usual)]
@@ -69,21 +71,36 @@ def independent(equations: Equations, point: Point, among: Array) -> Array:
 
 def changed_by(equations: Equations, point: Point, ways: Array) -> Array:
     """The transposed Jacobian of the rows times combinations, columns (rows, k): (unknowns, k), dimensionless."""
-    n = equations.unknowns
-    chosen = (equations.row >= n) & (equations.column < n)
-    row, column, entries = equations.row[chosen] - n, equations.column[chosen], point.entries[chosen]
+    n, (chosen, row, column) = equations.unknowns, equations.jacobian_entries
+    entries = point.entries[chosen]
     found = [np.bincount(column, weights=entries * way[row], minlength=n) for way in ways.T]
     return np.array(found).reshape(ways.shape[1], n).T
 
 
 def _all_singular(equations: Equations, point: Point) -> tuple[Array, Array, float]:
     """Squares (rows,) of all singular values of the Jacobian, left vectors (rows, rows) and the largest square."""
-    n = equations.unknowns
-    chosen = (equations.row >= n) & (equations.column < n)
-    rows = np.zeros((equations.rows, n))
-    rows[equations.row[chosen] - n, equations.column[chosen]] = point.entries[chosen]
-    squares, left = np.linalg.eigh(rows @ rows.T)
+    squares, left = np.linalg.eigh(_products(equations, point))
     return squares, left, float(squares[-1])
+
+
+def _products(equations: Equations, point: Point) -> Array:
+    """The Jacobian of the rows times its transposed, (rows, rows)."""
+    chosen, row, column = equations.jacobian_entries
+    rows = np.zeros((equations.rows, equations.unknowns))
+    rows[row, column] = point.entries[chosen]
+    return np.asarray(rows @ rows.T)
+
+
+def _clearly_independent(equations: Equations, point: Point, usual: float) -> bool:
+    """Whether no singular value is small, by bounds of the least and the largest that cost little."""
+    products = _products(equations, point)
+    try:
+        inverse = np.linalg.inv(products)
+    except np.linalg.LinAlgError:
+        return False
+    # The least square is above one over the sum of the inverses of all, the largest below their sum.
+    sizes = inverse.diagonal()
+    return bool((sizes > 0.0).all() and ROUGHLY * max(float(products.trace()), usual) * float(sizes.sum()) < 1.0)
 
 
 def _smallest(equations: Equations, point: Point) -> tuple[Array, Array, float]:
