@@ -143,6 +143,15 @@ def test_columns_near_and_beyond_their_critical_load_are_left():
     assert np.abs(found.quantities["nodes.B.position"][0] - [1.0, 0.0, 0.0]).max() <= ACCURACY
 
 
+def test_of_several_steps_the_last_one_is_told():
+    scene, cases = beam().replace({"analysis.steps": [0.5, 2.0]}), {"loads.tip.value.1": [1.0, 2.0]}
+    one, other = (sweep(scene, cases, ["nodes.B.position"], executor=Here(), batch=batch) for batch in (True, False))
+    assert not one.outcomes.own
+    assert np.abs(one.values("nodes.B.position") - other.values("nodes.B.position")).max() <= ACCURACY
+    with pytest.raises(SceneError, match=r"^quantities: .*step"):
+        sweep(scene, cases, ["nodes.B.position step 0.5"], batch=True)
+
+
 def test_order_and_threads_change_no_bit(monkeypatch):
     monkeypatch.setattr(plain, "CHUNK", 8)
     scene, cases = beam(), drawn(SCENES["plane"][1], count=30)

@@ -98,6 +98,7 @@ def plain_cases(
     Parameters
     ----------
     scene : Scene
+        Its answer is that of the last step.
     arguments : sequence of Argument
         The numbers that change.
     results : sequence of str
@@ -119,6 +120,9 @@ def plain_cases(
     why = _extraordinary(scene, settings)
     if why:
         return why
+    # Of several steps the last one is asked for, to which the loads of those before lead as well.
+    last = scene.analysis.model_copy(update={"steps": scene.analysis.steps[-1:]})
+    scene = scene.model_copy(update={"analysis": last})
     mesh, assembly = known or asked_mesh(scene, settings)[:2]
     flexible = [name for name, member in scene.members.items() if member.type == "flexible"]
     found = PlainCases(scene, arguments, results, settings, mesh, assembly, chosen_places(flexible, places or {}))
@@ -129,7 +133,6 @@ def _extraordinary(scene: Scene, settings: Settings) -> str:
     """What makes no case of a scene plain, in a few words."""
     asked = {
         "an analysis that is not static": scene.analysis.type != "static",
-        "several steps": len(scene.analysis.steps) != 1,
         "a search for all equilibria": scene.analysis.equilibria != "one",
         "contact": bool(scene.contacts),
         "stops or tendons that may be slack": scene.stopped,

@@ -294,7 +294,7 @@ class ParametricEquilibrium:
         solver = self.solver
         results = [one.name for one in solver.results.results]
         known, places = (solver.model.mesh, solver.model.assembly), solver.results.places
-        asked = {"type": "static", "equilibria": "one", "steps": solver.scene.analysis.steps[-1:]}
+        asked = {"type": "static", "equilibria": "one"}
         scene = solver.scene.model_copy(update={"analysis": solver.scene.analysis.model_copy(update=asked)})
         return plain_cases(scene, solver.arguments.arguments, results, self.settings, places=places, known=known)
 
