@@ -6,6 +6,7 @@
 #include "factors.c"
 #include "newton.c"
 #include "follow.c"
+#include "afar.c"
 
 int sf_version(void) { return SF_VERSION; }
 
@@ -25,6 +26,8 @@ int sf_sizes(int *sizes) {
   sizes[11] = (int)sizeof(sf_count_of);
   sizes[12] = (int)sizeof(sf_way);
   sizes[13] = (int)sizeof(sf_cases);
-  sizes[14] = SF_OPERATIONS;
+  sizes[14] = (int)sizeof(sf_rules);
+  sizes[15] = (int)sizeof(sf_sought);
+  sizes[16] = SF_OPERATIONS;
   return 0;
 }

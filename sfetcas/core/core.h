@@ -11,7 +11,7 @@
 #ifndef SFETCAS_CORE_H
 #define SFETCAS_CORE_H
 
-#define SF_VERSION 2
+#define SF_VERSION 3
 
 #ifdef _WIN32
 #define SF_PUBLIC __declspec(dllexport)
@@ -200,6 +200,38 @@ SF_PUBLIC int sf_correct_size(const sf_model *model);
 SF_PUBLIC int sf_correct(const sf_model *model, sf_system *system, const double *given, const double *tangent,
                          sf_border *border, const sf_limits *limits, sf_state *state, sf_point *point, double *memory,
                          sf_report *report);
+
+/* ---- Newton's method from afar ----------------------------------------------------------------------- */
+
+/* How a solve ended: Code of sfetcas/solvers/globalised.py. */
+#define SF_SOLVED 0
+#define SF_UNSTABLE 1
+#define SF_ITERATIONS 2
+#define SF_STALLED 3
+#define SF_NOT_FINITE 4
+#define SF_NOT_DEFINED (-1) /* number of negative eigenvalues where loads have no potential */
+
+/* What controls the method: Rules of sfetcas/solvers/globalised.py, and what follows from a model. */
+typedef struct {
+  const double *mass, *sides, *seed; /* (total,) of shifts, of the softness, start of the lowest mode */
+  const sf_tape *convex;             /* positive matrices of elements; NULL: none */
+  double *slots;                     /* memory that its tape takes */
+  int stiffness;                     /* where matrices begin among the results of an element */
+  int rounds, halvings, escapes, sweeps;
+  int symmetric, pivoted, free, sliding;
+  double converged, rounding, gain, turn, near, proximal, soft, hard, firm, firmer, left, armijo, noise, nudge, far;
+  double level, least;
+} sf_rules;
+
+/* How it ended; left: iterations that were not needed. */
+typedef struct {
+  int status, negative, left;
+  double residual;
+} sf_sought;
+
+SF_PUBLIC int sf_seek_size(const sf_model *model, const sf_rules *rules);
+SF_PUBLIC int sf_seek(const sf_model *model, sf_system *system, const sf_rules *rules, const double *given, int whole,
+                      int left, sf_state *state, sf_point *point, double *memory, sf_sought *sought);
 
 /* ---- loads that grow, and many cases ---------------------------------------------------------------- */
 

@@ -33,6 +33,8 @@ __all__ = [
     "Pivoted",
     "Point",
     "Report",
+    "Rules",
+    "Sought",
     "State",
     "Sums",
     "System",
@@ -233,12 +235,32 @@ class Cases(ctypes.Structure):
     )
 
 
-HANDED = (TapeTable, Group, Model, Point, Factors, Pivoted, System, Limits, Border, Report, Counting, Way, Cases)
+class Rules(ctypes.Structure):
+    """``sf_rules``."""
+
+    _fields_ = (
+        *((name, _pointer) for name in ("mass", "sides", "seed", "convex", "slots")),
+        *((name, _int) for name in ("stiffness", "rounds", "halvings", "escapes", "sweeps")),
+        *((name, _int) for name in ("symmetric", "pivoted", "free", "sliding")),
+        *((name, _double) for name in ("converged", "rounding", "gain", "turn", "near", "proximal", "soft", "hard")),
+        *((name, _double) for name in ("firm", "firmer", "left", "armijo", "noise", "nudge", "far", "level", "least")),
+    )
+
+
+class Sought(ctypes.Structure):
+    """``sf_sought``."""
+
+    _fields_ = (*((name, _int) for name in ("status", "negative", "left")), ("residual", _double))
+
+
+OF_WAYS = (Counting, Way, Cases, Rules, Sought)
+
+HANDED = (TapeTable, Group, Model, Point, Factors, Pivoted, System, Limits, Border, Report, *OF_WAYS)
 
 SIZES = (16, *(ctypes.sizeof(kind) for kind in HANDED), len(NAMES))
 """What the core says of the sizes of what is handed to it, if it is the one that this module was written for."""
 
-VERSION = 2
+VERSION = 3
 """Number of the interface, as ``SF_VERSION``."""
 
 
@@ -312,5 +334,7 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL | None:
     library.sf_negative.argtypes = [_pointer] * 5
     library.sf_follow.argtypes = [_pointer] * 10
     library.sf_solve_cases.argtypes = [_pointer] * 9
+    library.sf_seek_size.argtypes = [_pointer] * 2
+    library.sf_seek.argtypes = [*[_pointer] * 4, _int, _int, *[_pointer] * 4]
     library.sf_solve.argtypes = [_pointer, _pointer, _int, _pointer, _pointer, _pointer]
     return library

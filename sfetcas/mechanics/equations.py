@@ -14,13 +14,14 @@ import copy
 import functools
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from .. import tolerances
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array, Index
-from ..mathematics.core import Border, Counting, Limits, Report, Way, doubles
+from ..mathematics.core import Border, Counting, Limits, Report, Rules, Sought, Way, doubles
 from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import CoreSystem, SparseSolver
 from .batches import GroupBatch, at_rest
@@ -468,6 +469,24 @@ class Equations:
             return None
         there, reached = self._core.follow(system, _arrays(state), doubles(tangent), way, limits, counting)
         return State(*there), reached
+
+    def sought(
+        self, state: State, loading: Loading, rules: Rules, whole: int, left: int
+    ) -> tuple[State, Sought] | None:
+        """The globalised Newton method by the core: the last state, and how it ended; None without a core.
+
+        Arguments are those of :meth:`.CoreModel.seek`; the tape of ``rules`` is set by :meth:`positive_matrices`.
+        """
+        system = self.solver.of_core
+        if system is None or self._core is None:
+            return None
+        there, sought = self._core.seek(system, _arrays(state), self.given(loading), rules, whole, left)
+        return State(*there), sought
+
+    @functools.cached_property
+    def positive_matrices(self) -> tuple[int, Array, int, list[Any]] | None:
+        """What the core needs for positive matrices of elements, see :meth:`.CoreModel.convex_of`."""
+        return None if self._core is None else self._core.convex_of(self.model)
 
     def clearly_negative(self, entries: Array, counting: Counting) -> int | None:
         """Number of negative eigenvalues by the core; None without one, where one is near zero, or nobody knows."""

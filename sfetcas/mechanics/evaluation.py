@@ -427,6 +427,46 @@ class CoreModel:
             system.make_room()
         return (q, y, lam, unwrapped), not ended
 
+    def seek(
+        self,
+        system: CoreSystem,
+        state: tuple[Array, Array, Array, Array],
+        given: Array,
+        rules: c.Rules,
+        whole: int,
+        left: int,
+    ) -> tuple[tuple[Array, Array, Array, Array], c.Sought]:
+        """The globalised Newton method from a state (q, y, lam, unwrapped): the last one, and how it ended.
+
+        Parameters
+        ----------
+        whole : int
+            Whole steps at most, from a near state; 0 for the way downhill.
+        left : int
+            Iterations at most.
+        """
+        q, y, lam, unwrapped = there = tuple(np.array(part, dtype=float) for part in state)
+        handed, sought, of_rules = c.State(*(part.ctypes.data for part in there)), c.Sought(), ctypes.addressof(rules)
+        memory = np.empty(self._library.sf_seek_size(self._address, of_rules))
+        addresses = (system.address, of_rules, given.ctypes.data, whole, left, ctypes.addressof(handed))
+        rest = (self._scratch.address, memory.ctypes.data, ctypes.addressof(sought))
+        while self._library.sf_seek(self._address, *addresses, *rest) == NO_ROOM:
+            system.make_room()
+        return (q, y, lam, unwrapped), sought
+
+    def convex_of(self, model: Model) -> tuple[int, Array, int, list[Any]] | None:
+        """The tape of the positive matrices of elements, memory for it, and where they are among their results.
+
+        None without elements, or of a kind of element whose function has none.  The list has what must live as long.
+        """
+        if not len(model.terms[0].data):
+            return None
+        tape = tape_of(model.element.convex)
+        if tape is None:
+            return None
+        table, arrays = c.table_of(tape)
+        return ctypes.addressof(table), np.empty(8 * tape.slots), self._layout.tapes[0].parts[4], [table, *arrays]
+
     def negative(self, system: CoreSystem, entries: Array, counting: c.Counting) -> int | None:
         """Number of negative eigenvalues of a matrix; None where one is near zero, or factors do not tell."""
         addresses = (system.address, entries.ctypes.data, ctypes.addressof(counting), self._following.ctypes.data)

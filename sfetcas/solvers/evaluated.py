@@ -6,14 +6,24 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics.arrays import Array, Index
+from ..mathematics.core import Rules as CoreRules
+from ..mathematics.core import doubles
 from ..mathematics.linear import InertiaSolver, SparseSolver
 from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
-from .globalised import Shifts
-from .residuals import relative_residual
+from .globalised import Code, Globalised, Shifts
+from .residuals import LEAST_SCALE, relative_residual
 
 __all__ = ["Evaluated"]
+
+
+SAME = (
+    *("rounds", "halvings", "sweeps", "converged", "rounding", "gain", "turn", "near", "proximal", "soft", "hard"),
+    *("firm", "firmer", "left", "armijo", "noise", "nudge", "far"),
+)
+"""Rules that the core has by the same names."""
 
 
 class Evaluated:
@@ -91,6 +101,47 @@ class Evaluated:
     def convex(self, state: State, given: Loading) -> Array:
         """Entries of the matrix with positive matrices of the elements."""
         return self.equations.convex_entries(state, given)
+
+    def seek(
+        self, method: Globalised, state: State, given: Loading, whole: int, left: int
+    ) -> tuple[Code, State, float, int, int] | None:
+        """By the core: see :meth:`.Method.seek`."""
+        equations, rules = self.equations, method.rules
+        if not equations.by_core:
+            return None
+        matrices = equations.positive_matrices
+        if matrices is None and self.model.mesh.elements:
+            return None
+        tape, slots, stiffness, alive = matrices or (None, np.empty(0), 0, [])
+        mass, sides = doubles(method.mass), doubles(method.soft)
+        # The shape that unstable equilibria are left along is made where there is one.
+        for escapes in (0, rules.escapes) if rules.escapes and not whole else (0,):
+            seed = doubles(method.seed) if escapes else mass
+            known = CoreRules(
+                mass=mass.ctypes.data,
+                sides=sides.ctypes.data,
+                seed=seed.ctypes.data,
+                convex=tape,
+                slots=slots.ctypes.data,
+                stiffness=stiffness,
+                escapes=escapes,
+                symmetric=self.model.has_potential,
+                pivoted=method.pivoted,
+                free=not self.turns(given),
+                sliding=self.model.mesh.sliding,
+                level=tolerances.LEVEL,
+                least=LEAST_SCALE,
+                **{name: getattr(rules, name) for name in SAME},
+            )
+            found = equations.sought(state, given, known, whole, left)
+            if found is None:
+                return None
+            state, sought = found
+            left = sought.left
+            if sought.status != Code.UNSTABLE:
+                break
+        del alive
+        return Code(sought.status), state, sought.residual, sought.negative, left
 
     def move(self, state: State, step: Array, share: float) -> State:
         """The state after a share of a step (total,)."""

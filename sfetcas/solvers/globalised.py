@@ -20,6 +20,7 @@ Sources: Nocedal and Wright 2006, chapters 3 and 18 (line search on an l1 merit 
 from __future__ import annotations
 
 import enum
+import functools
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Protocol
 
@@ -271,6 +272,25 @@ class Method(Protocol):
     def move(self, state: Any, step: Array, share: float) -> Any:
         """The state after a share of a step (total,)."""
 
+    def seek(
+        self, method: Globalised, state: Any, given: Any, whole: int, left: int
+    ) -> tuple[Code, Any, float, int, int] | None:
+        """What :class:`Globalised` finds from a state, at once; None where it has to do it step by step.
+
+        Parameters
+        ----------
+        method : Globalised
+        state, given
+        whole : int
+            Whole steps at most, from a near state; 0 for the way downhill and out of what is unstable.
+        left : int
+            Iterations at most.
+
+        Returns
+        -------
+        Code, state, relative residual, number of negative eigenvalues, iterations that were not needed
+        """
+
 
 class Globalised:
     """The method for one program.
@@ -317,9 +337,6 @@ class Globalised:
             [0.0, 1.0, -1.0], [self._rotation_unknowns, self._unknowns - self._rotation_unknowns, equations.rows]
         )
         self.diagonal = program.diagonal
-        # Start vector for the lowest mode: the fields of the rule of sides, and tiny displacements.
-        beside = LEAST / (1.0 + np.arange(self._unknowns - self._rotation_unknowns))
-        self.seed = np.concatenate([Sides(equations).seed, beside, np.zeros(equations.rows)])
         self._symmetric = program.model.has_potential
         # Where a line ends the Lagrangian has no curvature along the member: there is no order without small pivots.
         self.pivoted = not self._symmetric or program.model.mesh.lies
@@ -327,6 +344,21 @@ class Globalised:
         shifts = Shifts(self.rules.proximal, self.mass, self.soft, self.diagonal)
         self._systems = program.systems(shifts, factors=self._symmetric and self._total > 0, pivoted=self.pivoted)
         self._left = 0
+
+    @functools.cached_property
+    def seed(self) -> Array:
+        """Start vector (total,) for the lowest mode: the fields of the rule of sides, and tiny displacements."""
+        beside = LEAST / (1.0 + np.arange(self._unknowns - self._rotation_unknowns))
+        equations = self.program.equations
+        return np.concatenate([Sides(equations).seed, beside, np.zeros(equations.rows)])
+
+    def _sought(self, state: Any, given: Any, whole: int = 0) -> Outcome | None:
+        """What is found at once, see :meth:`Method.seek`."""
+        found = self.program.seek(self, state, given, whole, self._left)
+        if found is None:
+            return None
+        code, there, residual, negative, self._left = found
+        return Outcome(code, self.program.flattened(there), residual, negative, 0)
 
     # -- linear algebra -----------------------------------------------------------------------------
 
@@ -431,7 +463,7 @@ class Globalised:
 
     def _near(self, state: Any, given: Any) -> Outcome | None:
         """By whole steps to an equilibrium that need not be left; None where they do not lead to one."""
-        found = self._corrected(self._at(state, given), given, self.rules.corrections)
+        found = self._by_whole_steps(state, given, self.rules.corrections)
         if found.code is not Code.SOLVED:
             return None
         if found.negative <= 0 or not self.program.model.minimisable:
@@ -443,7 +475,10 @@ class Globalised:
         """Downhill from a state to an equilibrium, and on from unstable ones, ``escapes`` times."""
         program = self.program
         if not program.model.downhill:
-            return self._corrected(self._at(state, given), given, self._left)
+            return self._by_whole_steps(state, given, self._left)
+        sought = self._sought(state, given)
+        if sought is not None:
+            return sought
         for _ in range(self.rules.escapes + 1):
             found = self._descended(self._at(state, given), given)
             if found.code is not Code.SOLVED or found.negative <= 0:
@@ -543,7 +578,7 @@ class Globalised:
             there = min(1.0, share + step)
             loads = self._shared(given, there)
             there_begun = program.hold(reached, loads)
-            found = self._corrected(self._at(there_begun, loads), loads, rules.corrections)
+            found = self._by_whole_steps(there_begun, loads, rules.corrections)
             if found.code is Code.SOLVED:
                 share, reached, step = there, program.standing(found.state), 2.0 * step
                 continue
@@ -562,6 +597,11 @@ class Globalised:
         if self.begun is not None:
             return self.program.taken(self.begun[0] + share * (given - self.begun[0]))
         return self.program.shared(given, share)
+
+    def _by_whole_steps(self, state: Any, given: Any, most: int) -> Outcome:
+        """Newton's method from a near state."""
+        sought = self._sought(state, given, most) if most else None
+        return sought or self._corrected(self._at(state, given), given, most)
 
     def _corrected(self, here: _Here, given: Any, most: int) -> Outcome:
         """Newton's method from a near state."""

@@ -29,7 +29,7 @@ from ..mechanics.rotations import RotationFreedom
 from ..mechanics.singles import counted_angle, turned_vector
 from ..mechanics.stationarity import Stationarity, summed
 from ..mechanics.terms import GROUND, energies_of
-from .globalised import Shifts
+from .globalised import Globalised, Shifts
 from .residuals import LEAST_SCALE
 
 __all__ = ["Program", "data_of", "is_data"]
@@ -145,6 +145,9 @@ class Program:
     def standing(self, flat: Array) -> ca.DM:
         """The state of a vector (states,) as the functions take it."""
         return ca.DM(flat)
+
+    def seek(self, method: Globalised, state: ca.DM, given: ca.DM, whole: int, left: int) -> None:
+        """Not at once: every number is that of generated C."""
 
     def flattened(self, state: ca.DM) -> Array:
         """The vector (states,) of such a state."""
