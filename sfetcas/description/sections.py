@@ -126,6 +126,8 @@ def evaluate(varying: Quantity, x: ArrayLike, length: float = np.nan) -> Floats:
     -------
     (n,) - in the unit of the quantity
     """
+    if isinstance(varying, float) and isinstance(x, np.ndarray):
+        return np.full(x.shape or (1,), varying)
     x = np.atleast_1d(numbers(x))
     if isinstance(varying, Table):
         return numbers(np.interp(x, numbers(varying.at), numbers(varying.value)))

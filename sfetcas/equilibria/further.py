@@ -49,7 +49,7 @@ class FurtherEquilibria:
         answers, dropped = [replace(answer, notes=(*answer.notes, *result.family_note(0)))], 0
         for number, solved in enumerate(result.found[1:], start=1):
             notes = result.family_note(number)
-            further = self._further(EquilibriumResult(solved, solved.stability, notes, kept=True, way=("search",)))
+            further = self._further(EquilibriumResult(solved, notes=notes, kept=True, way=("search",)))
             if further is None:
                 dropped += 1
             elif not any(same(further, other) for other in answers):

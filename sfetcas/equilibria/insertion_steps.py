@@ -300,7 +300,7 @@ class InsertionSteps:
         way_there = ("growing", *("left",) * bool(snaps))
         # What is said of the tangent at factor 0 does not hold of the whole way.
         notes = (*found.notes, *notes) if solved.model.conservative else (NO_ENERGY,)
-        return EquilibriumResult(solved, solved.stability, notes, found.iterations, way=way_there), tuple(snaps)
+        return EquilibriumResult(solved, notes=notes, iterations=found.iterations, way=way_there), tuple(snaps)
 
     def _carried(self, found: EquilibriumResult, refined: Equilibrium) -> EquilibriumResult:
         """What the next step begins with: the answer of this one on the mesh of the ways."""
@@ -308,4 +308,4 @@ class InsertionSteps:
         state = transferred(refined.model, refined.state, prepared.model)
         solved = prepared.correct(state, found.solved.loading)
         solved = solved if solved.converged else found.solved
-        return replace(found, solved=solved, notes=(), iterations=0)
+        return found.onto(solved, notes=(), iterations=0)

@@ -203,7 +203,7 @@ class MemorySteps:
         solved = prepared.correct(state, loading, iterations=25, most=1.5, contraction=np.inf)
         if not solved.converged or prepared.distance(state, solved.state) > DRIFT:
             return None
-        return replace(near, solved=solved)
+        return near.onto(solved)
 
     def _step(self, prepared: Prepared, factor: float, before: Sequence[EquilibriumResult]) -> EquilibriumResult:
         """The step from the one before, or from the undeformed scene.
@@ -224,7 +224,7 @@ class MemorySteps:
             if not prepared.model.minimisable:
                 raise SolveError(Status.FAILED, "the loads could not be followed from the step before", state)
             solved, iterations = prepared.minimise(loading, state)
-            found = EquilibriumResult(solved, solved.stability, (NOT_FOLLOWED,), iterations, way=("minimum",))
+            found = EquilibriumResult(solved, notes=(NOT_FOLLOWED,), iterations=iterations, way=("minimum",))
         notes = found.notes
         if not prepared.model.conservative:
             notes += (NO_ENERGY,)

@@ -45,8 +45,8 @@ class EquilibriumResult:
     Attributes
     ----------
     solved : Solved
-    stability : Stability
-        On the mesh where it was found first: finer meshes do not repeat the test before the answer.
+    found : Solved or None
+        On the mesh where it was found first, if that is another one.
     notes : tuple of str
     iterations : int
         Iterations of IPOPT.
@@ -59,12 +59,21 @@ class EquilibriumResult:
     """
 
     solved: Solved
-    stability: Stability
+    found: Solved | None = None
     notes: tuple[str, ...] = ()
     iterations: int = 0
     kept: bool = False
     drifts: int = 0
     way: tuple[str, ...] = ()
+
+    @property
+    def stability(self) -> Stability:
+        """On the mesh where it was found first: finer meshes do not repeat the test before the answer."""
+        return (self.found or self.solved).stability
+
+    def onto(self, solved: Solved, **more: Any) -> EquilibriumResult:
+        """The same equilibrium on another mesh."""
+        return replace(self, solved=solved, found=self.found or self.solved, **more)
 
 
 class Meshing:

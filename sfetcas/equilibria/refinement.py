@@ -134,7 +134,7 @@ class Refinement:
                 raise SolveError(Status.FAILED, detail, state)
         apart = prepared.distance(state, solved.state) > DRIFT and ELSEWHERE not in source.notes
         notes = (*source.notes, ELSEWHERE) if apart else source.notes
-        return replace(source, solved=solved, notes=notes, drifts=drifts, way=way)
+        return source.onto(solved, notes=notes, drifts=drifts, way=way)
 
     @staticmethod
     def _placed(source: Solved, prepared: Prepared, loading: Loading) -> State:
@@ -262,7 +262,7 @@ class Refinement:
             solved = found.solved.prepared.switch_branch(found.solved, found.solved.loading)
             note = "left an equilibrium that is unstable on the fine mesh only"
             notes, way = (*found.notes, note), (*found.way, "left")
-            found = replace(found, solved=solved, stability=solved.stability, notes=notes, way=way)
+            found = replace(found, solved=solved, found=None, notes=notes, way=way)
             # The error and the difference were those of the state that was left.
             error, halved = sum(self._difference(found, self.onto(solved.model.mesh.refined(), found))), None
             found = self._accepted(found)
@@ -429,4 +429,4 @@ def _with_unique_reactions(found: EquilibriumResult) -> EquilibriumResult:
         # Where straight bars are all that acts, rounding of large multipliers is much beside what is in balance.
         note = "reactions are not unique, one set of many is given"
     note += f"; redundant: {named_in(equations, loose)}"
-    return replace(found, solved=solved, notes=(*found.notes, note))
+    return found.onto(solved, notes=(*found.notes, note))

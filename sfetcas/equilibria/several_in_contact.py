@@ -296,7 +296,7 @@ class SeveralInContact:
                 answer = self.steps.refined(found, found.factor, one.notes)
                 answer = replace(answer, way=("search", *answer.way))
             else:
-                free = EquilibriumResult(found, found.stability, one.notes, kept=True, way=("search", "no contact"))
+                free = EquilibriumResult(found, notes=one.notes, kept=True, way=("search", "no contact"))
                 answer = self.refinement.refined(free)
                 if not self.run.clear(answer.fields):
                     return None

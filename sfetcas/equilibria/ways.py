@@ -239,12 +239,12 @@ class Ways:
         """From the start guess at the full load."""
         near = nearest(pilot, loading) if self.started and not self.meshes.switch_branch else None
         if near is not None:
-            return EquilibriumResult(near, near.stability, way=("beside",)), None
+            return EquilibriumResult(near, way=("beside",)), None
         try:
             solved, iterations, way = cold(pilot, loading, self.meshes.settings.solver)
         except SolveError as error:
             return None, error
-        return EquilibriumResult(solved, solved.stability, iterations=iterations, way=(way,)), None
+        return EquilibriumResult(solved, iterations=iterations, way=(way,)), None
 
     def _carried(self, pilot: Prepared, factor: float) -> EquilibriumResult | None:
         """Where the loads carry the undeformed state: slack has no place of its own from which to follow them.
@@ -276,7 +276,7 @@ class Ways:
         solved = alone.solved.prepared.switch_branch(alone.solved, alone.solved.loading)
         ways = counted(alone.stability.negative, "way out", "ways out")
         note = f"left an unstable equilibrium with {ways} along its unstable mode"
-        return _by("left", EquilibriumResult(solved, solved.stability, (note,), alone.iterations, way=alone.way))
+        return _by("left", EquilibriumResult(solved, notes=(note,), iterations=alone.iterations, way=alone.way))
 
     def _grown(
         self, pilot: Prepared, factor: float, last: tuple[float, EquilibriumResult] | None
@@ -404,7 +404,7 @@ class Ways:
             notes += (KEPT,)
         elif passed:
             notes += (PASSED,)
-        return EquilibriumResult(solved, solved.stability, notes, way=("growing", *("left",) * bool(result.left)))
+        return EquilibriumResult(solved, notes=notes, way=("growing", *("left",) * bool(result.left)))
 
 
 def _by(way: str, found: EquilibriumResult) -> EquilibriumResult:

@@ -445,11 +445,12 @@ class CoreFactors:
         place = np.argsort(order).astype(np.intc)
         start = np.searchsorted(column, np.arange(n + 1)).astype(np.intc)
         self.tables = tables = [start, np.ascontiguousarray(row, dtype=np.intc), order, place]
-        memory = [np.zeros(size, np.intc) for size in (n, n + 1, 0, 0, 0, n, n, n)] + [np.zeros(n)]
-        memory[2:5] = [np.zeros(0, np.intc), np.zeros(0), np.zeros(n)]
-        self._arrays = [*tables, *memory]
-        addresses = [part.ctypes.data for part in self._arrays]
-        self._factors = Factors(n, len(row), *addresses[:4], 0, *addresses[4:])
+        # One piece of memory of each kind: of many small ones each would take as long.
+        self._memory = whole, numbers = np.zeros(5 * n + 1, np.intc), np.zeros(2 * n)
+        parent, mark, path, used, lower = (_address(whole, k * n) for k in range(5))
+        pivot, column_ = (_address(numbers, k * n) for k in range(2))
+        known = [_address(part) for part in tables]
+        self._factors = Factors(n, len(row), *known, 0, parent, lower, 0, 0, pivot, mark, path, used, column_)
         self.address = ctypes.addressof(self._factors)
         library.sf_count(self.address)
         filled = self._factors.filled
@@ -502,27 +503,27 @@ class CoreSystem:
         self._library, self._n, self._soft = library, n, doubles(soft)
         self._factors = CoreFactors(library, n, row, column)
         order = _sparse_order(n, row, column, last).astype(np.intc)
-        self._whole = [np.zeros(n, np.intc) for _ in range(6)] + [np.zeros(n + 1, np.intc) for _ in range(2)]
-        self._numbers = [np.zeros(n), np.zeros(n)]
+        self._whole, self._numbers = np.zeros(8 * n + 2, np.intc), np.zeros(6 * n)
         self._order, self._room = order, 0
-        self._pivoted = Pivoted(n)
         start, rows = self._factors.tables[:2]
-        arrays: list[Array] = [start, rows, order, *self._whole, *self._numbers]
-        for name, part in zip(PIVOTED, arrays, strict=True):
-            setattr(self._pivoted, name, part.ctypes.data)
+        places = [*(_address(self._whole, k * n) for k in range(7)), _address(self._whole, 7 * n + 1)]
+        numbers = [_address(self._numbers, k * n) for k in range(2)]
+        arrays = zip(PIVOTED, [_address(start), _address(rows), _address(order), *places, *numbers], strict=True)
+        self._pivoted = Pivoted(n=n, **dict(arrays))
         self.make_room(8 * len(row) + 2 * n)
         addresses = (self._factors.address, ctypes.addressof(self._pivoted), self._soft.ctypes.data)
         self._system = System(*addresses, int(symmetric), 0, OFTEN, SOLVED)
         self.address = ctypes.addressof(self._system)
-        self._work = np.zeros(4 * n)
+        self._work = self._numbers[2 * n :]
 
     def make_room(self, room: int = 0) -> None:
         """Room for factors with pivots; by default twice as much as there is."""
         self._room = room or 2 * self._room
-        self._memory = [np.empty(self._room, kind) for kind in (np.intc, np.intc, float, float)]
-        self._pivoted.room = self._room
-        for name, part in zip(("lower_row", "upper_row", "lower_value", "upper_value"), self._memory, strict=True):
-            setattr(self._pivoted, name, part.ctypes.data)
+        room = self._room
+        self._memory = whole, numbers = np.empty(2 * room, np.intc), np.empty(2 * room)
+        pivoted = self._pivoted
+        pivoted.room, pivoted.lower_row, pivoted.upper_row = room, _address(whole), _address(whole, room)
+        pivoted.lower_value, pivoted.upper_value = _address(numbers), _address(numbers, room)
 
     def solved(self, entries: Array, b: Array) -> Array:
         """Solution for b (n,) or (n, k).
@@ -543,6 +544,11 @@ class CoreSystem:
             if broken:
                 raise np.linalg.LinAlgError("singular matrix")
             return x.T
+
+
+def _address(array: Array, begin: int = 0) -> int:
+    """Where the entries of an array begin, or those from one on."""
+    return int(array.ctypes.data) + begin * array.itemsize
 
 
 # fmt: off

@@ -143,7 +143,7 @@ class Equations:
     def _judge(self) -> None:
         """What rounding leaves of each residual in the unloaded scene."""
         # A hundredth of the stiffness against turning a node: 1e-14 of it is what rounding of rotations leaves.
-        self.noise[...] = np.abs(self.elastic_entries()[self.diagonal]) * 0.01
+        self.noise[...] = np.abs(self._elastic_diagonal()) * 0.01
         for group in self._terms[1:]:
             group.add_noise(self.noise)
         # Sections turn: about any fixed axis rounding is that of the stiffest one, also where nothing resists a turn.
@@ -621,10 +621,20 @@ class Equations:
         jacobian[:, self.rotation_unknowns :] = positions.Y.rows(chosen).full()
         return self.displacements(state, loading, found[2])[0][chosen], jacobian
 
+    def _at_rest(self) -> tuple[State, Loading]:
+        nothing = self.model.loading(0.0, 0.0)
+        return replace(self.start(nothing), q=at_rest(self.model.element, len(self.model.rotations.kind))), nothing
+
+    def _elastic_diagonal(self) -> Array:
+        """The diagonal of :meth:`elastic_entries`, to which constraints add nothing."""
+        if self._core is None:
+            return self.elastic_entries()[self.diagonal]
+        rest, nothing = self._at_rest()
+        return self._core.at(_arrays(rest), self.given(nothing)).entries[self.diagonal]
+
     def elastic_entries(self) -> Array:
         """Entries of the Newton matrix for the strain energy of the elements alone in the undeformed state."""
-        nothing = self.model.loading(0.0, 0.0)
-        rest = replace(self.start(nothing), q=at_rest(self.model.element, len(self.model.rotations.kind)))
+        rest, nothing = self._at_rest()
         pairs = zip(self._terms, self._evaluated(rest, nothing).groups, strict=True)
         return self._matrix([group.entries([*part[:5], 0.0 * part[5]]) for group, part in pairs], ties=0.0)
 

@@ -20,6 +20,7 @@ the mesh; its symmetric part is taken, whose eigenvalues are those of the energy
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import casadi as ca
@@ -455,6 +456,14 @@ class StabilityTest:
     def _clearly_negative(self, point: Point) -> int | None:
         """Number of negative eigenvalues where the core tells it and none is near zero; see :meth:`counting`."""
         return None if self._counting is None else self.equations.clearly_negative(point.entries, self._counting[0])
+
+    def is_held(self, undeformed: Callable[[], Point]) -> bool:
+        """Whether clearly nothing can move without strain, by the core; False where it does not tell.
+
+        Nor where displacements have no stiffness of their own: whether closings determine them it does not know.
+        """
+        known = self._n == self.equations.unknowns and self._counting is not None
+        return known and self._clearly_negative(undeformed()) == 0
 
     @functools.cached_property
     def _counting(self) -> tuple[Counting, Array] | None:
