@@ -427,8 +427,9 @@ def test_no_finite_force_holds_two_straight_bars(kinds, length, turned, force):
 @pytest.mark.parametrize("rise", [1e-2, 1e-4, 1e-5])
 def test_two_bars_that_are_nearly_straight_are_held_by_large_forces(rise):
     force = solve(made(two_bars(rise))).last.reaction("A")[0]
-    # Rounding of the closings, 1e-16, moves the joint by that over its rise.
-    np.testing.assert_allclose(force, [-0.5 / rise, -0.5, 0.0], rtol=1e-16 / rise**2 + 1e-12, atol=1e-9)
+    # Rounding of the closings, the spacing of numbers of the size of one, moves the joint by that over its rise.
+    rounding = np.finfo(float).eps / rise**2
+    np.testing.assert_allclose(force, [-0.5 / rise, -0.5, 0.0], rtol=rounding + 1e-12, atol=1e-9)
 
 
 def test_slider_across_a_straight_member_is_refused():
