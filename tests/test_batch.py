@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from scenes import arch, cantilever, made
 
-from sfetcas import Analysis, Expect, SceneError, dump, load, parametric, solve, sweep
+from sfetcas import Analysis, Expect, SceneError, Settings, dump, load, parametric, solve, sweep
 from sfetcas.checks import asked
 from sfetcas.cli import main
 from sfetcas.mathematics.core import core
 from sfetcas.parametric import plain
+from sfetcas.parametric.arguments import asked_for
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 ACCURACY = 1e-6
@@ -213,6 +214,17 @@ def test_values_out_of_range_are_refused_as_by_single_solves():
     assert found.outcomes[0].reason == single.outcomes[0].reason
     assert found.failures[0].case == 0
     assert found.outcomes[1].status == "solved"
+
+
+def test_numbers_beyond_all_bounds_are_left_without_a_warning(recwarn):
+    values = np.array([[1e300, 1.0], [1e200, 1e-200], [1.0, 1e300], [1.0, 1.0]])
+    scene = beam()
+    arguments = asked_for(scene, ["loads.tip.value.1", "sections.s.EI3"])
+    found = plain.plain_cases(scene, arguments, ["nodes.B.position"], Settings()).solve(values, warm=True, threads=2)
+    assert found.known.tolist()[:2] == [False, False]
+    assert found.known[3]
+    assert np.isfinite(found.numbers[found.known]).all()
+    assert not recwarn.list
 
 
 def test_without_a_core_cases_are_solved_one_by_one(monkeypatch):

@@ -271,6 +271,8 @@ class PlainCases:
                 return replace(found, interrupted=True)
         return found
 
+    # Numbers beyond all bounds are no plain case; each thread has its own way with them.
+    @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def _chunk(self, values: Array, near: Array | None) -> PlainAnswers:
         """Solve cases together; ``near`` (cases,) are numbers of cases before, from which they begin, -1 for none."""
         begin = time.perf_counter()
