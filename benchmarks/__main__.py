@@ -1,8 +1,8 @@
 """Accuracy and speed measured: ``python -m benchmarks [NAME ...] [--save]``, from a clone of the repository.
 
 Names are order, loads, size, repeated, whole, derivatives, net, path, motion, steps, code, accuracy, pieces, sweep,
-import, extremes and compared; left out, all are run.  ``--save`` writes what each prints into ``benchmarks/results``,
-too.
+batch, import, extremes and compared; left out, all are run.  ``--save`` writes what each prints into
+``benchmarks/results``, too.
 
 Others, ``random``, ``jitter``, ``contact``, ``members``, ``ways`` and ``heap``, stand alone, take options (``--help``)
 and half an hour each.
@@ -27,7 +27,7 @@ from .extremes import extremes
 from .heap import heap
 from .importing import importing
 from .jitter import jitter
-from .many import many
+from .many import batch, many
 from .member_run import members
 from .motion import motion, step_cost
 from .pieces import pieces
@@ -53,7 +53,7 @@ def main(words: list[str]) -> None:
         "path": path,
         "motion": motion,
     }
-    known |= {"steps": step_cost, "code": code, "accuracy": knob, "pieces": pieces, "sweep": many}
+    known |= {"steps": step_cost, "code": code, "accuracy": knob, "pieces": pieces, "sweep": many, "batch": batch}
     known |= {"import": importing, "extremes": extremes, "compared": compared}
     alone: dict[str, Callable[[list[str]], None]] = {"random": random_scenes, "jitter": jitter}
     alone |= {"contact": contact, "members": members, "ways": ways, "heap": heap}

@@ -34,7 +34,7 @@ def rows(printed):
 
 def test_benchmark_of_another_name_is_refused():
     accepted = (
-        "net, path, motion, steps, code, accuracy, pieces, sweep, import, extremes, compared, "
+        "net, path, motion, steps, code, accuracy, pieces, sweep, batch, import, extremes, compared, "
         "random, jitter, contact, members, ways, heap"
     )
     with pytest.raises(SystemExit, match=rf"found benchmark 'nets', accepted: .*{accepted}$"):
@@ -46,11 +46,26 @@ def test_sweeps_are_measured_against_their_solves(capsys, monkeypatch):
     monkeypatch.setattr(benchmark_many, "_dask", contextlib.nullcontext)
     main(["sweep"])
     found = rows(capsys.readouterr().out)
-    assert [(row[0], row[-1]) for row in found] == 2 * [("plane", "the same")] + 2 * [("space", "the same")]
-    for row in found:
+    answers = ["the same", "the same", "others", "others"]
+    assert [(row[0], row[-1]) for row in found] == [(space, same) for space in ("plane", "space") for same in answers]
+    for row in found[:2] + found[4:6]:
         wall, solves, overhead = float(row[2]), float(row[3]), float(row[5].strip(" %"))
         # printed with two digits, of which a tenth of a second of solves is off by a twentieth
         assert cores() * wall / solves - 1.0 == pytest.approx(overhead / 100.0, rel=0.1)
+
+
+def test_batches_are_measured(capsys, monkeypatch):
+    monkeypatch.setattr(benchmark_many, "MANY", 3)
+    monkeypatch.setattr(benchmark_many, "FEWER", 2)
+    main(["batch"])
+    found = rows(capsys.readouterr().out)
+    assert [row[:3] for row in found] == [
+        ["cantilever", "9", "zero"],
+        ["cantilever", "9", "near"],
+        ["tendon robot", "4", "zero"],
+        ["tendon robot", "4", "near"],
+    ]
+    assert all(row[5] == "0" and float(row[6]) <= benchmark_many.ACCURACY for row in found)
 
 
 def test_imports_are_measured(capsys, monkeypatch):
