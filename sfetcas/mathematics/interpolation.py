@@ -121,7 +121,13 @@ def legendre_values(x: Array, degree: int) -> Array:
 
 def legendre_tail(nodes: Array) -> Array:
     """Row (len(nodes),) that takes nodal values to the coefficient of the highest Legendre polynomial."""
-    return np.asarray(np.linalg.inv(legendre.legvander(2.0 * nodes - 1.0, len(nodes) - 1))[-1])
+    return _tail(nodes.tobytes())
+
+
+@functools.lru_cache(maxsize=256)
+def _tail(values: bytes) -> Array:
+    nodes = np.frombuffer(values)
+    return fixed(np.asarray(np.linalg.inv(legendre.legvander(2.0 * nodes - 1.0, len(nodes) - 1))[-1]))
 
 
 def cubic_spline(x: ArrayLike, y: ArrayLike, ends: tuple[str, str] = ("clamped", "clamped")) -> Array:

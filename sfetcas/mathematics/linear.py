@@ -447,9 +447,9 @@ class CoreFactors:
         self.tables = tables = [start, np.ascontiguousarray(row, dtype=np.intc), order, place]
         # One piece of memory of each kind: of many small ones each would take as long.
         self._memory = whole, numbers = np.zeros(5 * n + 1, np.intc), np.zeros(2 * n)
-        parent, mark, path, used, lower = (_address(whole, k * n) for k in range(5))
-        pivot, column_ = (_address(numbers, k * n) for k in range(2))
-        known = [_address(part) for part in tables]
+        parent, mark, path, used, lower = _parts_of(whole, n, 5)
+        pivot, column_ = _parts_of(numbers, n, 2)
+        known = [part.ctypes.data for part in tables]
         self._factors = Factors(n, len(row), *known, 0, parent, lower, 0, 0, pivot, mark, path, used, column_)
         self.address = ctypes.addressof(self._factors)
         library.sf_count(self.address)
@@ -506,9 +506,11 @@ class CoreSystem:
         self._whole, self._numbers = np.zeros(8 * n + 2, np.intc), np.zeros(6 * n)
         self._order, self._room = order, 0
         start, rows = self._factors.tables[:2]
-        places = [*(_address(self._whole, k * n) for k in range(7)), _address(self._whole, 7 * n + 1)]
-        numbers = [_address(self._numbers, k * n) for k in range(2)]
-        arrays = zip(PIVOTED, [_address(start), _address(rows), _address(order), *places, *numbers], strict=True)
+        places, numbers = _parts_of(self._whole, n, 8), _parts_of(self._numbers, n, 2)
+        # The last two have one entry more than the others.
+        places[-1] += self._whole.itemsize
+        known = [start.ctypes.data, rows.ctypes.data, order.ctypes.data]
+        arrays = zip(PIVOTED, [*known, *places, *numbers], strict=True)
         self._pivoted = Pivoted(n=n, **dict(arrays))
         self.make_room(8 * len(row) + 2 * n)
         addresses = (self._factors.address, ctypes.addressof(self._pivoted), self._soft.ctypes.data)
@@ -522,8 +524,9 @@ class CoreSystem:
         room = self._room
         self._memory = whole, numbers = np.empty(2 * room, np.intc), np.empty(2 * room)
         pivoted = self._pivoted
-        pivoted.room, pivoted.lower_row, pivoted.upper_row = room, _address(whole), _address(whole, room)
-        pivoted.lower_value, pivoted.upper_value = _address(numbers), _address(numbers, room)
+        pivoted.room = room
+        pivoted.lower_row, pivoted.upper_row = _parts_of(whole, room, 2)
+        pivoted.lower_value, pivoted.upper_value = _parts_of(numbers, room, 2)
 
     def solved(self, entries: Array, b: Array) -> Array:
         """Solution for b (n,) or (n, k).
@@ -546,9 +549,10 @@ class CoreSystem:
             return x.T
 
 
-def _address(array: Array, begin: int = 0) -> int:
-    """Where the entries of an array begin, or those from one on."""
-    return int(array.ctypes.data) + begin * array.itemsize
+def _parts_of(array: Array, size: int, count: int) -> list[int]:
+    """Where the first of so many parts of an array begin, each of a size."""
+    begin, step = int(array.ctypes.data), size * array.itemsize
+    return [begin + k * step for k in range(count)]
 
 
 # fmt: off
