@@ -164,6 +164,75 @@ def test_order_and_threads_change_no_bit(monkeypatch):
         assert one.values(key)[order].tolist() == two.values(key).tolist()
 
 
+def test_a_case_that_fails_changes_no_bit_of_those_after_it():
+    """Softness that did not do is forgotten."""
+    scene = load(PROBLEMS / "lee_frame.toml").replace({"analysis": Analysis(accuracy=ACCURACY), "expect": ()})
+    forces, chosen = [-1.9, -30.0, 1e6, -1.0, -0.5], ["nodes.load.position"]
+    solve_ = lambda loads: sweep(scene, {"loads.load.value.1": loads}, chosen, batch=True, executor=Here())  # noqa: E731
+    after, before = solve_(forces), solve_(forces[::-1])
+    assert after.values(chosen[0])[3:].tolist() == before.values(chosen[0])[::-1][3:].tolist()
+
+
+def moved_kinks():
+    """A section whose stiffness has a kink."""
+    table = cantilever(analysis={"accuracy": ACCURACY})
+    table["sections"]["s"] |= {"EI3": {"at": [0, 0.4, 1], "value": [2.0, 1.0, 0.7]}}
+    return made(table)
+
+
+CHECKED = {
+    # A kink within an element, which no halving shows.
+    "sections.s.EI3.at.1": (moved_kinks, [0.4, 0.35, 0.6, 1.5], None),
+    # Elements end where the load acts: it is left where that is elsewhere.
+    "loads.tip.at": (
+        lambda: made(
+            {
+                **cantilever(analysis={"accuracy": ACCURACY}),
+                "loads": {"tip": {"type": "force", "member": "m", "at": 0.4, "value": [0, 1]}},
+            }
+        ),
+        [0.4, 0.3, 0.6],
+        [1, 2],
+    ),
+    # Ten numbers that a scene does not accept together.
+    "sections.s.GJ": (
+        lambda: made({**cantilever(analysis={"accuracy": ACCURACY}), "dimension": "space"}),
+        [1.0, -1.0],
+        [1],
+    ),
+    "nodes.B.position.0": (beam, [1.0, 0.7, 1.3], []),
+}
+
+
+@pytest.mark.parametrize("name", CHECKED)
+def test_numbers_that_are_more_than_numbers_are_checked_against_models_made_anew(name):
+    make, values, own = CHECKED[name]
+    scene, quantity = make(), ["nodes.B.position"]
+    if own is None:
+        with pytest.raises(SceneError, match="found a place at which a quantity along a member has a kink"):
+            sweep(scene, {name: values}, quantity, batch=True)
+        return
+    found, single = (sweep(scene, {name: values}, quantity, batch=batch, executor=Here()) for batch in (True, False))
+    assert sorted(found.outcomes.own) == own
+    assert found.table["status"].tolist() == single.table["status"].tolist()
+    errors = found.table["error_estimate"] + single.table["error_estimate"]
+    apart = np.linalg.norm(found.quantities[quantity[0]] - single.quantities[quantity[0]], axis=1)
+    assert (apart[found.solved] <= 2.0 * errors[found.solved]).all()
+
+
+@pytest.mark.parametrize("name", ["arch", "space"])
+def test_a_row_is_the_model_of_its_case(name):
+    """Data and loads from the functions of all numbers, against a model that is assembled for each."""
+    make, ranges, quantities = SCENES["closed" if name == "arch" else name]
+    scene = make()
+    plain_ = plain.plain_cases(scene, asked_for(scene, list(ranges)), quantities, Settings())
+    values = np.column_stack(list(drawn(ranges).values()))
+    level = plain_._level(0)
+    rows = level.rows(values)
+    assert all(plain_._is_so(*case) for case in zip(values, rows, strict=True))
+    assert not any(plain_._is_so(case, 1.001 * row) for case, row in zip(values, rows, strict=True))
+
+
 def test_warm_starts_lead_to_the_same_where_there_is_one_equilibrium(monkeypatch):
     monkeypatch.setattr(plain, "CHUNK", 16)
     scene, cases = beam(), drawn({"loads.tip.value.1": (-4.0, 4.0)}, count=40)

@@ -189,6 +189,8 @@ int sf_solve_cases(const sf_model *m, sf_system *system, sf_cases *cases, const 
     const double *row = cases->row + (size_t)i * numbers;
     double *own = cases->state + (size_t)i * size;
     sf_count_of counted = *count;
+    /* No case depends on those before it. */
+    system->lost = 0;
     counted.shift *= cases->stiffer[i];
     cases->found[i] = 0;
     cases->residual[i] = NAN;

@@ -400,7 +400,7 @@ class Ways:
             return None
         solved = pilot.correct(result.state, way(1.0))
         notes = tuple(f"jumped {_at(part, factors)}: {JUMPED}" for part in result.left)
-        if solved.stability.negative and self.meshes.switch_branch and not energy_known:
+        if not energy_known and self.meshes.switch_branch and solved.stability.negative:
             notes += (KEPT,)
         elif passed:
             notes += (PASSED,)

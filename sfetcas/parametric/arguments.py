@@ -316,6 +316,9 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
     if re.fullmatch(r"histories\.[^.]+\.t(\.\d+)?", name):
         message = "found a time or factor at which a history has a knot, accepted: its values or coefficients"
         raise SceneError(message, ("arguments", name))
+    if KINKS.fullmatch(name) and not MOVING.fullmatch(name):
+        message = "found a place at which a quantity along a member has a kink, where an element ends, accepted: values"
+        raise SceneError(message, ("arguments", name))
     found = _argument(scene, name, low, high)
     if MOVING.fullmatch(name) or SLIDING.fullmatch(name):
         found = _within(scene, found)
@@ -361,6 +364,9 @@ def _argument(scene: Scene, name: str, low: float | None, high: float | None) ->
         return Argument(name, values, _unit(scene, path), _meaning(path), low, high, tuple(chosen))
     return Argument(name, (float(value),), _unit(scene, path), _meaning(path), low, high)
 
+
+KINKS = re.compile(r"(sections|loads|actuations|magnets)\..+\.at(\.\d+)?")
+"""Names of places along members between which quantities are linear, with which no element moves."""
 
 MOVING = re.compile(r"loads\.([^.]+)\.(at|from|to)")
 """Names of places of loads along members, with which elements move."""

@@ -8,6 +8,8 @@ enough.  All others are left to :func:`~sfetcas.solve`.  Decisions are those of
 
 from __future__ import annotations
 
+import functools
+import re
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -21,15 +23,16 @@ import numpy as np
 from ..description.scene import Scene
 from ..equilibria.refinement import DRIFT, TORN
 from ..equilibria.settings import Settings
+from ..errors import SceneError
 from ..mathematics import interpolation
 from ..mathematics.arrays import Array, Index
-from ..mathematics.constants import times
+from ..mathematics.constants import sparse, times
 from ..mathematics.core import Cases, doubles, integers
 from ..mathematics.many import Many
 from ..mechanics.accuracy import WITHIN, gain, remaining
-from ..mechanics.equations import State
+from ..mechanics.equations import Equations, State
 from ..mechanics.fields import transferred
-from ..mechanics.mesh import Mesh
+from ..mechanics.mesh import Mesh, breaks_of
 from ..mechanics.model import Model, assemble
 from ..mechanics.rotations import RotationFreedom
 from ..mechanics.stations import Stations
@@ -45,6 +48,18 @@ __all__ = ["NO_CORE", "PlainAnswers", "PlainCases", "nearest_before", "plain_cas
 
 NO_CORE = "no core, which needs a C compiler"
 """What hinders all cases where there is none: they are solved one by one then."""
+
+SIMPLE = re.compile(
+    r"factor|loads\.[^.]+\.value(\.\d)?|sections\.[^.]+\.(EI2|EI3|GJ|E)|springs\.[^.]+\.stiffness|"
+    r"tendons\.[^.]+\.tension|gravity(\.\d)?|motions\.[^.]+\.(displacement|rotation)(\.\d)?"
+)
+"""Numbers that a scene accepts within their limits, whatever the others are, and that move no end of an element."""
+
+MORE = ("coupling", "stiffness_", "law", "stretch_law")
+"""What makes stiffness of a section more than its own numbers."""
+
+EPSILON, SAME = 1e-12, 1e-9
+"""What ends of elements may be beside kinks, fractions of a length; and data beside those of a model made anew."""
 
 CHUNK = 512
 """Cases that a thread solves together: functions of all of them are evaluated at once."""
@@ -221,9 +236,41 @@ class PlainCases:
             while len(self._levels) <= number:
                 model = self._model(self._meshes[len(self._levels)]) if self._levels else self._first
                 coarser = self._levels[-1].model if self._levels else None
-                more = (self.scene, model, self._arguments, self._results, self._places, self._meshes[0], coarser)
-                self._levels.append(_Level(*more))
+                self._levels.append(_Level(self.scene, model, self._arguments, self._results, self._places, coarser))
             return self._levels[number]
+
+    def _seen(self, level: _Level, number: int) -> Callable[[Array, Array], tuple[Array, Array]]:
+        """What is compared of states on a level with those beside it, at places within the elements of one mesh."""
+        with self._lock:
+            return level.seen_at(self._meshes[number])
+
+    @functools.cached_property
+    def _simple(self) -> bool:
+        """Whether the numbers that change may have any values within their limits, and move no end of an element."""
+        plain = (
+            section for section in self.scene.sections.items() if not any(getattr(section[1], key) for key in MORE)
+        )
+        known = {name for name, _ in plain}
+        return all(
+            one.numbers is None
+            and SIMPLE.fullmatch(one.name) is not None
+            and (not one.name.startswith("sections.") or one.name.split(".")[1] in known)
+            for one in self._arguments
+        )
+
+    def _is_so(self, values: Array, row: Array) -> bool:
+        """Whether the scene accepts values (numbers,), and its model is the one whose data a row has."""
+        first = self._level(0)
+        try:
+            scene = first.arguments.scene_at(values)
+            model = assemble(scene, self._meshes[0], assembly=self._assembly, scales=first.model.scales)
+            kinks = ((name, breaks_of(scene, name)) for name in model.members)
+            ends = all(
+                np.abs(cuts[:, None] - self._meshes[0].cuts[n]).min(axis=1).max() <= EPSILON for n, cuts in kinks
+            )
+            return ends and first.is_of(model, scene.analysis.steps[-1], row)
+        except (SceneError, ArithmeticError):
+            return False
 
     @property
     def sizes(self) -> list[int]:
@@ -277,7 +324,11 @@ class PlainCases:
         """Solve cases together; ``near`` (cases,) are numbers of cases before, from which they begin, -1 for none."""
         begin = time.perf_counter()
         count, first = len(values), self._level(0)
-        accepted = first.arguments.accepted(values)
+        rows, accepted = first.rows(values), first.arguments.accepted(values)
+        if not self._simple:
+            accepted = np.array(
+                [good and self._is_so(*case) for good, *case in zip(accepted, values, rows, strict=True)]
+            )
         chosen = np.flatnonzero(accepted)
         if near is not None:
             # Numbers among those that are accepted.
@@ -285,19 +336,21 @@ class PlainCases:
             near = place[np.where(accepted[near], near, -1)][chosen]
         numbers = np.full((count, first.results.size), np.nan)
         errors, residuals, known = np.full(count, np.nan), np.full(count, np.nan), np.zeros(count, dtype=bool)
-        states, residuals[chosen], found = first.followed(values[chosen], near)
+        states, residuals[chosen], found = first.followed(rows[chosen], near)
         chosen, here = chosen[found], states[found]
-        p = values[chosen]
-        shape, rough = first.seen(p, here)
+        p, coarse = values[chosen], first
         for number in range(MESHES - 1):
-            if not len(chosen):
+            finer = self._level(number + 1) if len(chosen) else None
+            if finer is None or not finer.by_core:
                 break
-            finer = self._level(number + 1)
             begun = finer.begun_at(here)
-            there, left, found = finer.corrected(p, begun)
+            there, left, found = finer.corrected(finer.rows(p), begun)
             turned = finer.distance(begun, there)
-            finer_shape, finer_rough = finer.seen(p, there)
-            apart = (finer_shape - shape).reshape(len(p), -1, 3)
+            (shape, rough), (finer_shape, finer_rough) = (
+                self._seen(level, number)(p, states) for level, states in ((coarse, here), (finer, there))
+            )
+            axes = first.model.element.axes
+            apart = (finer_shape - shape).reshape(len(p), shape.shape[1] // axes, axes)
             difference = np.linalg.norm(apart, axis=2).max(axis=1, initial=0.0) / self.scene.size
             error = remaining(difference, gain(rough, finer_rough, finer.model.element.order))
             good = found & (turned <= DRIFT)
@@ -311,8 +364,7 @@ class PlainCases:
                 numbers[rows[fine]], errors[rows[fine]] = told[fine], error[done][fine]
                 residuals[rows] = left[done]
             going = good & ~done
-            chosen, here, p = chosen[going], there[going], p[going]
-            shape, rough = finer_shape[going], finer_rough[going]
+            chosen, here, p, coarse = chosen[going], there[going], p[going], finer
         seconds = np.full(count, (time.perf_counter() - begin) / max(count, 1))
         return PlainAnswers(known, numbers, errors, residuals, seconds)
 
@@ -327,13 +379,13 @@ class _Level:
         arguments: Sequence[Argument],
         results: Sequence[str],
         places: Mapping[str, Sequence[float]],
-        coarsest: Mesh,
         coarser: Model | None,
     ) -> None:
-        self.model, self._coarsest = model, coarsest
         self.results = Results(model, results, places)
         self.arguments = Arguments(scene, model, arguments, self.results, "plain_", needed=False)
-        self.prepared = Prepared(self.arguments.model)
+        # The one in which no entry vanishes by chance.
+        self.model = model = self.arguments.model
+        self.prepared = Prepared(model)
         self.states = self.arguments.program.states
         equations, parts = self.prepared.equations, self.arguments.program.sizes
         self._zero = self.arguments.program.flat(equations.start(model.loading(0.0)))
@@ -344,12 +396,13 @@ class _Level:
         # Prescribed rotations, if motions turn any.
         held = np.flatnonzero(self.model.rotations.kind == RotationFreedom.FIXED)
         self._turned = integers(held if "turn" in parts else held[:0])
-        self._rows = self._of_rows()
+        self.rows = self._of_rows()
         rest = self.arguments.undeformed(self._p)
         self.told = self._told_by(self.results.expression(self.arguments.program, rest))
-        self._shape = self._of_shape()
         self.begun_at = _Refining(coarser or model, model)
         self._numbers = self.prepared.weight, self.prepared._test.softest
+        self.by_core = equations.apart() is not None
+        self._shapes = dict[int, Many]()
 
     # -- functions ------------------------------------------------------------------------------------
 
@@ -374,19 +427,46 @@ class _Level:
         inner = ca.Function("inner", [p, program.state_symbol, program.symbol], [ca.densify(expression)])
         return Many(ca.Function("told", [p, state], [inner(p, state, self.arguments.given(p))]))
 
-    def _of_shape(self) -> Many:
-        """(arguments, state) -> displacements (m) of nodes and of places within elements, and roughness."""
-        model, places = self.model, dict[str, tuple[float, ...]]()
+    def seen_at(self, mesh: Mesh) -> Callable[[Array, Array], tuple[Array, Array]]:
+        """Displacements (cases, axes * places), m, and largest roughness (cases,), of values and states.
+
+        Places are nodes, ends of members, and within elements of a mesh as in :mod:`~sfetcas.mechanics.accuracy`.
+        """
+        if mesh.elements not in self._shapes:
+            self._shapes[mesh.elements] = self._of_shape(mesh)
+        function = self._shapes[mesh.elements]
+
+        def seen(p: Array, states: Array) -> tuple[Array, Array]:
+            found = function(p, states)
+            return found[:, :-1], found[:, -1]
+
+        return seen
+
+    def _of_shape(self, mesh: Mesh) -> Many:
+        """(arguments, state) -> displacements (m) of places and within elements, axes by axes, and roughness."""
+        program, expressions, model = self.arguments.program, self.arguments.expressions, self.model
+        (q, y, _, _), given, n = program.parts, program.given, expressions.points
+        moved = ca.reshape(expressions.displacements(q, y, given), expressions.axes, expressions.places)
+        # Of rigid members it is their ends that move farthest.
+        found, gained = [moved], expressions.tangents(q, expressions.retained_places(y, given), given) - given.tangent
         for name, member in model.scene.members.items():
-            if member.type == "flexible":
-                cuts = self._coarsest.cuts[name]
-                within = (cuts[:-1, None] + np.diff(cuts)[:, None] * WITHIN).ravel()
-                places[name] = (*within.tolist(), float(cuts[-1]))
-        # Of rigid members it is their nodes that move farthest.
-        names = [*(f"members.{name}.position" for name in places), *(f"nodes.{name}.position" for name in model.nodes)]
-        shown = Results(model, names, places)
-        moved = shown.expression(self.arguments.program, ca.MX.zeros(len(shown.rest(model))))
-        return self._told_by(ca.vertcat(moved, self._roughness()))
+            if member.type != "flexible":
+                continue
+            part, cuts = model.elements_of(name), mesh.cuts[name]
+            within = (cuts[:-1, None] + np.diff(cuts)[:, None] * WITHIN).ravel()
+            at, count = (
+                Stations(model.element, model.mesh.cuts[name], np.append(within, cuts[-1])),
+                part.stop - part.start,
+            )
+            own = gained[:, part.start * n : part.stop * n]
+            chords = ca.mtimes(own, ca.kron(ca.DM.eye(count), ca.DM.ones(n, 1)))
+            begin = ca.cumsum(ca.horzcat(moved[:, model.segments.place(model.segments.ends[name, 0])], chords), 1)
+            columns = np.repeat(np.arange(len(at.xi)), n)
+            rows = (at.elements[:, None] * n + np.arange(n)).ravel()
+            inside = sparse(rows, columns, at.gained.ravel(), (count * n, len(at.xi)))
+            found.append(begin[:, at.elements.tolist()] + ca.mtimes(own, inside))
+        shown = ca.vec(ca.horzcat(*found)) * model.scales.length
+        return self._told_by(ca.vertcat(shown, self._roughness()))
 
     def _roughness(self) -> ca.MX:
         """Largest of :func:`~sfetcas.mechanics.accuracy.roughness`."""
@@ -409,32 +489,38 @@ class _Level:
         chord = chord * (model.scales.length / model.scene.size)
         return ca.mmax((2.0 if model.space else 1.0) * angles + chord)
 
-    def seen(self, p: Array, states: Array) -> tuple[Array, Array]:
-        """Displacements (cases, 3 places), m, and largest roughness (cases,) of states."""
-        found = self._shape(p, states)
-        return found[:, :-1], found[:, -1]
-
     # -- solving --------------------------------------------------------------------------------------
 
     def distance(self, one: Array, other: Array) -> Array:
         """Largest rotations (cases,), rad, between states."""
         components = self.model.element.components
         n = components * len(self.model.rotations.kind)
-        a, b = (part[:, :n].reshape(len(part), -1, components) for part in (one, other))
+        a, b = (part[:, :n].reshape(len(part), n // components, components) for part in (one, other))
         if not self.model.space:
             return np.abs(a - b).max(axis=(1, 2), initial=0.0)
         cosine = np.abs(np.einsum("cni,cni->cn", a, b)).clip(0.0, 1.0)
         return np.asarray(2.0 * np.arccos(cosine.min(axis=1, initial=1.0)))
 
-    def followed(self, p: Array, near: Array | None) -> tuple[Array, Array, Array]:
-        """States, residuals, and which were found, of loads that grow from zero or from near cases."""
-        rows = self._rows(p)
-        states = np.repeat(self._zero[None, :], len(p), axis=0)
-        return self._solved(rows, states, near, follows=True)
+    def is_of(self, model: Model, factor: float, row: Array) -> bool:
+        """Whether a row is that of a model at a load factor, and the data that do not vary are its own."""
+        if [len(group.data) for group in model.terms] != [len(group.data) for group in self.model.terms]:
+            return False
+        still = [i for i in range(len(model.terms)) if i not in self._varying]
+        loading = model.loading(factor)
+        own = [model.terms[i].data for i in (*self._varying, *still)]
+        own += [Equations(model).given(loading), loading.turn[self._turned]]
+        sizes = sum(model.terms[i].data.size for i in self._varying)
+        known = [row[:sizes], *(self.model.terms[i].data for i in still), row[sizes:]]
+        mine, other = (np.concatenate([part.ravel() for part in parts]) for parts in (known, own))
+        return mine.shape == other.shape and bool(np.allclose(mine, other, rtol=SAME, atol=SAME * np.abs(other).max()))
 
-    def corrected(self, p: Array, states: Array) -> tuple[Array, Array, Array]:
+    def followed(self, rows: Array, near: Array | None) -> tuple[Array, Array, Array]:
+        """States, residuals, and which were found, of loads that grow from zero or from near cases."""
+        return self._solved(rows, np.repeat(self._zero[None, :], len(rows), axis=0), near, follows=True)
+
+    def corrected(self, rows: Array, states: Array) -> tuple[Array, Array, Array]:
         """States, residuals, and which were found, from states beside them."""
-        return self._solved(self._rows(p), states.copy(), None, follows=False)
+        return self._solved(rows, states.copy(), None, follows=False)
 
     def _solved(self, rows: Array, states: Array, near: Array | None, *, follows: bool) -> tuple[Array, Array, Array]:
         prepared, equations = self.prepared, self.prepared.equations
@@ -472,7 +558,7 @@ class _Level:
         model, turns = self.model, 3 * len(self._turned)
         end = rows.shape[1] - turns - 2 * self._places - self.prepared.equations.total - len(model.positions.rows)
         travel = np.abs(rows[:, end : end + self._places]).max(axis=1, initial=0.0)
-        vectors = rows[:, rows.shape[1] - turns :].reshape(len(rows), -1, 3)
+        vectors = rows[:, rows.shape[1] - turns :].reshape(len(rows), len(self._turned), 3)
         turned = np.linalg.norm(vectors, axis=2).max(axis=1, initial=0.0)
         driven = np.clip(np.maximum(travel / TRAVEL, turned), 1.0, FARTHEST)
         return np.asarray(1.0 / np.maximum(driven, turned if model.space else 0.0))
@@ -487,8 +573,8 @@ class _Level:
         if 0 not in self._varying or not (base > 0.0).any():
             return np.ones(len(rows))
         element = self.model.element
-        own = rows[:, : len(base) * element.sizes[3]].reshape(len(rows), len(base), -1)
-        own = own[:, :, : base.shape[1] * element.stiffnesses].reshape(len(rows), *base.shape, -1)
+        own = rows[:, : len(base) * element.sizes[3]].reshape(len(rows), len(base), element.sizes[3])
+        own = own[:, :, : base.shape[1] * element.stiffnesses].reshape(len(rows), *base.shape, element.stiffnesses)
         sizes = np.linalg.norm(own, axis=3)[:, base > 0.0] / base[base > 0.0]
         return np.ascontiguousarray(sizes.max(axis=1))
 

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..description.records import counted, say, unknown
+from ..description.records import counted, say, unknown, whole
 from ..description.scene import Scene, check_scene
 from ..description.showing import shown, stability_in_words, values_in_words
 from ..equilibria.settings import Settings
@@ -234,8 +234,8 @@ class ParametricEquilibrium:
         values : mapping
             A column (cases,) or (cases, k) for each parameter that changes, in the units of the scene.
         warm : bool
-            Begin at the nearest case solved before: several times faster, but which of several stable equilibria is
-            found depends on the order of the cases.
+            Begin at the nearest case solved before: two to three times faster, but which of several stable equilibria
+            is found depends on the order of the cases.
         threads : int, optional
             By default as many as there are processors.
         progress : callable, optional
@@ -252,11 +252,12 @@ class ParametricEquilibrium:
         >>> equilibrium.many({"loads.tip.value.1": [0, 5, 10]})["nodes.tip.position"]         # doctest: +SKIP
         """
         numbers = self._columns(values)
+        threads = cores() if threads is None else whole(threads, 1, what="number of threads", name="threads")
         found = np.full((len(numbers), self.solver.results.size), np.nan)
         errors, residuals = np.full((2, len(numbers)), np.nan)
         left, failures, plain = np.arange(len(numbers)), dict[int, str](), self._plain
         if not isinstance(plain, str):
-            answers = plain.solve(numbers, warm=warm, threads=threads or cores(), progress=progress)
+            answers = plain.solve(numbers, warm=warm, threads=threads, progress=progress)
             if answers.interrupted:
                 raise KeyboardInterrupt
             found, errors, residuals = answers.numbers, answers.errors, answers.residuals

@@ -70,11 +70,12 @@ def sweep(
     batch : bool
         Solve cases in which nothing out of the ordinary happens by the core, in threads of this process: on meshes
         that they share, the loads followed from zero, with error estimates as they are else.  All others, and those
-        whose eigenvalues or errors come near to a limit, are solved as without.  For scenes of statics without
+        whose eigenvalues or errors come near to a limit, are solved as without.  There are no notes, such as that
+        stretch which is left out would count.  For scenes of statics without
         contact, stops, histories and the like; positions differ by the accuracy from those without a batch.
     warm : bool
-        In a batch, begin at the nearest case solved before where that leads to a stable equilibrium: several times
-        faster, but where there are several stable ones the answer depends on the order of the cases.
+        In a batch, begin at the nearest case solved before where that leads to a stable equilibrium: two to three
+        times faster, but where there are several stable ones the answer depends on the order of the cases.
 
     Returns
     -------
@@ -108,11 +109,12 @@ def sweep(
     begin = time.perf_counter()
     if warm and not batch:
         raise SceneError("found True without a batch, accepted: warm = True with batch = True", ("warm",))
+    threads = cores() if workers is None else whole(workers, 1, what="number of threads", name="workers")
     plain = batch_of(scene, job.names, wanted, settings) if batch else None
     if plain is None:
         outcomes, interrupted = _fed(executor, workers, job, values.tolist(), chunk, progress)
         return gathered(scene, single, wanted, Outcomes.of(outcomes), time.perf_counter() - begin, interrupted)
-    answers = plain.solve(values, warm=warm, threads=workers or cores(), progress=progress)
+    answers = plain.solve(values, warm=warm, threads=threads, progress=progress)
     left, interrupted = np.flatnonzero(~answers.known), answers.interrupted
     others = [Outcome(NOT_RUN, "interrupted before")] * len(left)
     if len(left) and not interrupted:
