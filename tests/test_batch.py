@@ -168,8 +168,11 @@ def test_a_case_that_fails_changes_no_bit_of_those_after_it():
     """Softness that did not do is forgotten."""
     scene = load(PROBLEMS / "lee_frame.toml").replace({"analysis": Analysis(accuracy=ACCURACY), "expect": ()})
     forces, chosen = [-1.9, -30.0, 1e6, -1.0, -0.5], ["nodes.load.position"]
-    solve_ = lambda loads: sweep(scene, {"loads.load.value.1": loads}, chosen, batch=True, executor=Here())  # noqa: E731
-    after, before = solve_(forces), solve_(forces[::-1])
+
+    def solved(loads):
+        return sweep(scene, {"loads.load.value.1": loads}, chosen, batch=True, executor=Here())
+
+    after, before = solved(forces), solved(forces[::-1])
     assert after.values(chosen[0])[3:].tolist() == before.values(chosen[0])[::-1][3:].tolist()
 
 

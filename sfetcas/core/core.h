@@ -138,6 +138,7 @@ typedef struct {
   double *value, *pivot;           /* (filled,) and (n,) */
   int *mark, *path, *used;         /* (n,) each */
   double *column;                  /* (n,) */
+  double least;                    /* the smallest pivot over what was added up for it */
 } sf_factors;
 
 /* Factors of any matrix of the pattern with pivoting, see pivoted.h; room: entries that L and U may have, each. */
@@ -238,7 +239,7 @@ SF_PUBLIC int sf_seek(const sf_model *model, sf_system *system, const sf_rules *
 /* How it is told that all eigenvalues are clearly above zero, see sfetcas/solvers/stability.py. */
 typedef struct {
   const double *weight; /* (total,) of eigenvalues; zero where an unknown has none */
-  double shift, softest, soft, rounding, graded, broken, blurred;
+  double shift, softest, soft, rounding, graded, broken, blurred, signs;
   int rounds;
 } sf_count_of;
 

@@ -35,7 +35,7 @@ int sf_count(sf_factors *f) {
 
 /* One row of the factors; soft is added to the diagonal. */
 static int sf_row(sf_factors *f, const double *entries, double soft, int k) {
-  double pivot = soft, *column = f->column;
+  double pivot = soft, added = fabs(soft), *column = f->column;
   int from = f->order[k], top = f->n, p, i;
   f->mark[k] = k;
   f->used[k] = 0;
@@ -45,6 +45,7 @@ static int sf_row(sf_factors *f, const double *entries, double soft, int k) {
     if (i > k) continue;
     if (i == k) {
       pivot += entries[p];
+      added += fabs(entries[p]);
       continue;
     }
     column[i] += entries[p];
@@ -65,17 +66,21 @@ static int sf_row(sf_factors *f, const double *entries, double soft, int k) {
     for (p = at; p < end; ++p) column[f->lower_row[p]] -= f->value[p] * value;
     share = value / f->pivot[i];
     pivot -= share * value;
+    added += fabs(share * value);
     f->lower_row[end] = k;
     f->value[end] = share;
     ++f->used[i];
   }
   f->pivot[k] = pivot;
+  /* Its sign is that of rounding where next to nothing is left of what was added up. */
+  if (!(fabs(pivot) >= f->least * added)) f->least = added > 0.0 ? fabs(pivot) / added : 0.0;
   return pivot == 0.0;
 }
 
 static int sf_factorise_softly(sf_factors *f, const double *entries, const double *soft, int *negative) {
   int k, broken = 0;
   *negative = 0;
+  f->least = 1.0;
   for (k = 0; k < f->n; ++k) f->column[k] = 0.0;
   for (k = 0; k < f->n; ++k) f->mark[k] = -1;
   for (k = 0; k < f->n && !broken; ++k) {

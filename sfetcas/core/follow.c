@@ -81,7 +81,7 @@ static int sf_below(const sf_model *m, const sf_system *system, const double *en
     if (i >= m->rotation_unknowns) matrix[m->diagonal[i]] += count->soft * count->softest;
   }
   for (i = m->unknowns; i < m->total; ++i) matrix[m->diagonal[i]] -= count->soft / size;
-  if (sf_factorise(system->factors, matrix, &negative)) return -1;
+  if (sf_factorise(system->factors, matrix, &negative) || !(system->factors->least >= count->signs)) return -1;
   return sf_accurate(system->factors, count, matrix, place) ? negative - m->rows : -1;
 }
 

@@ -144,6 +144,7 @@ class Factors(ctypes.Structure):
         ("filled", _int),
         *((name, _pointer) for name in ("parent", "lower", "lower_row", "value", "pivot", "mark", "path", "used")),
         ("column", _pointer),
+        ("least", _double),
     )
 
 
@@ -205,7 +206,7 @@ class Counting(ctypes.Structure):
 
     _fields_ = (
         ("weight", _pointer),
-        *((name, _double) for name in ("shift", "softest", "soft", "rounding", "graded", "broken", "blurred")),
+        *((name, _double) for name in ("shift", "softest", "soft", "rounding", "graded", "broken", "blurred", "signs")),
         ("rounds", _int),
     )
 

@@ -288,10 +288,13 @@ class Model:
         histories = self.scene.histories
         return {name: factor if name is None else histories[name].factor(factor) for name in self.groups}
 
-    # One factor is asked for several times in a row: by a step, its equations, and what comes after it.
-    @kept(4)
     def loading(self, factor: float, share: float = 1.0) -> Loading:
         """Loads and prescribed motions at a load factor, multiplied by ``share``; dimensionless."""
+        return self._loading(float(factor), float(share))
+
+    # One factor is asked for several times in a row: by a step, its equations, and what comes after it.
+    @kept(4)
+    def _loading(self, factor: float, share: float) -> Loading:
         parts = [(self.groups[name], share * value) for name, value in self.factors(factor).items()]
         return Loading.combined([*parts, *((loading, share) for loading in self.standing)])
 

@@ -455,6 +455,8 @@ class StabilityTest:
 
     def _clearly_negative(self, point: Point) -> int | None:
         """Number of negative eigenvalues where the core tells it and none is near zero; see :meth:`counting`."""
+        if self.equations.rows and self.equations.redundant:
+            return None
         return None if self._counting is None else self.equations.clearly_negative(point.entries, self._counting[0])
 
     def is_held(self, undeformed: Callable[[], Point]) -> bool:
@@ -487,6 +489,7 @@ class StabilityTest:
             graded=GRADED,
             broken=BROKEN,
             blurred=BLURRED,
+            signs=SIGNS,
             rounds=MISSES,
         )
         return found, weight
@@ -609,6 +612,10 @@ BORDER_REGULARISATIONS = (BORDER_REGULARISATION, 10.0 * BORDER_REGULARISATION, 1
 
 FULL = 600
 """Largest number of unknowns for which dense matrices take less than a second."""
+
+SIGNS = 1e-11
+"""Least share of what was added up for a pivot that is left of it where its sign is told: rounding leaves 1e-16 times
+the number of terms, rows that depend on each other 1e-12, eigenvalues away from zero 1e-8."""
 
 BROKEN = 0.3
 """Share of the bordered matrix that its factors may miss: from 1 on pivots may have other signs."""
