@@ -232,8 +232,9 @@ def test_a_row_is_the_model_of_its_case(name):
     values = np.column_stack(list(drawn(ranges).values()))
     level = plain_._level(0)
     rows = level.rows(values)
-    assert all(plain_._is_so(*case) for case in zip(values, rows, strict=True))
-    assert not any(plain_._is_so(case, 1.001 * row) for case, row in zip(values, rows, strict=True))
+    pairs = list(zip(values, rows, strict=True))
+    assert all(plain_._size_of(*case) == scene.size for case in pairs)
+    assert np.isnan([plain_._size_of(case, 1.001 * row) for case, row in pairs]).all()
 
 
 def test_warm_starts_lead_to_the_same_where_there_is_one_equilibrium(monkeypatch):

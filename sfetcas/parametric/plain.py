@@ -258,8 +258,11 @@ class PlainCases:
             for one in self._arguments
         )
 
-    def _is_so(self, values: Array, row: Array) -> bool:
-        """Whether the scene accepts values (numbers,), and its model is the one whose data a row has."""
+    def _size_of(self, values: Array, row: Array) -> float:
+        """The size of the scene with values (numbers,), m, if it accepts them and its model has the data of a row.
+
+        Else nan.
+        """
         first = self._level(0)
         try:
             scene = first.arguments.scene_at(values)
@@ -268,9 +271,9 @@ class PlainCases:
             ends = all(
                 np.abs(cuts[:, None] - self._meshes[0].cuts[n]).min(axis=1).max() <= EPSILON for n, cuts in kinks
             )
-            return ends and first.is_of(model, scene.analysis.steps[-1], row)
-        except (SceneError, ArithmeticError):
-            return False
+            return scene.size if ends and first.is_of(model, scene.analysis.steps[-1], row) else np.nan
+        except (SceneError, ArithmeticError, np.linalg.LinAlgError):
+            return np.nan
 
     @property
     def sizes(self) -> list[int]:
@@ -324,11 +327,10 @@ class PlainCases:
         """Solve cases together; ``near`` (cases,) are numbers of cases before, from which they begin, -1 for none."""
         begin = time.perf_counter()
         count, first = len(values), self._level(0)
-        rows, accepted = first.rows(values), first.arguments.accepted(values)
-        if not self._simple:
-            accepted = np.array(
-                [good and self._is_so(*case) for good, *case in zip(accepted, values, rows, strict=True)]
-            )
+        rows, sizes = first.rows(values), np.where(first.arguments.accepted(values), self.scene.size, np.nan)
+        for i in () if self._simple else np.flatnonzero(np.isfinite(sizes)).tolist():
+            sizes[i] = self._size_of(values[i], rows[i])
+        accepted = np.isfinite(sizes)
         chosen = np.flatnonzero(accepted)
         if near is not None:
             # Numbers among those that are accepted.
@@ -351,7 +353,7 @@ class PlainCases:
             )
             axes = first.model.element.axes
             apart = (finer_shape - shape).reshape(len(p), shape.shape[1] // axes, axes)
-            difference = np.linalg.norm(apart, axis=2).max(axis=1, initial=0.0) / self.scene.size
+            difference = np.linalg.norm(apart, axis=2).max(axis=1, initial=0.0) / sizes[chosen]
             error = remaining(difference, gain(rough, finer_rough, finer.model.element.order))
             good = found & (turned <= DRIFT)
             smooth = finer_rough <= LEFT_ALONE * TORN
