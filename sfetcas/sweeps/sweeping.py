@@ -21,7 +21,7 @@ from .outcomes import Outcomes
 from .quantities import Wanted, wanted_of
 from .result import Sweep, gathered
 from .work import NOT_RUN, Job, Outcome
-from .workers import Workers
+from .workers import MOST_WORKERS, Workers
 
 __all__ = ["sweep"]
 
@@ -107,13 +107,15 @@ def sweep(
     job = Job(_expecting(scene, wanted), settings, tuple(single.columns), wanted)
     values = np.column_stack(list(single.columns.values()))
     begin = time.perf_counter()
+    if workers is not None:
+        workers = whole(workers, 1, MOST_WORKERS, what="number of processes", name="workers")
     if warm and not batch:
         raise SceneError("found True without a batch, accepted: warm = True with batch = True", ("warm",))
-    threads = cores() if workers is None else whole(workers, 1, what="number of threads", name="workers")
     plain = batch_of(scene, job.names, wanted, settings) if batch else None
     if plain is None:
         outcomes, interrupted = _fed(executor, workers, job, values.tolist(), chunk, progress)
         return gathered(scene, single, wanted, Outcomes.of(outcomes), time.perf_counter() - begin, interrupted)
+    threads = cores() if workers is None else workers
     answers = plain.solve(values, warm=warm, threads=threads, progress=progress)
     left, interrupted = np.flatnonzero(~answers.known), answers.interrupted
     others = [Outcome(NOT_RUN, "interrupted before")] * len(left)

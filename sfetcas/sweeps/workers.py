@@ -16,11 +16,10 @@ from multiprocessing.connection import Connection
 from typing import Any, ParamSpec, TypeVar
 
 from ..analyses import LATER
-from ..description.records import whole
 from ..errors import SceneError
 from ..processes import begin_apart, context_of, postponed
 
-__all__ = ["Workers"]
+__all__ = ["MOST_WORKERS", "Workers"]
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -30,7 +29,8 @@ PRELOADED = ["sfetcas.sweeps.work", *LATER]
 AHEAD = 2
 """Pieces of work that a process has at once: it does not wait for the next one."""
 
-MOST = 10_000
+MOST_WORKERS = 10_000
+"""Processes, or threads, at most."""
 
 
 class _Lane:
@@ -92,7 +92,6 @@ class Workers(Executor):
     """
 
     def __init__(self, count: int) -> None:
-        count = whole(count, 1, MOST, what="number of processes", name="workers")
         self._context = context_of(PRELOADED)
         self.room = AHEAD * count
         self._reader, self._writer = self._context.Pipe(duplex=False)
