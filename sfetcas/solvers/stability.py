@@ -472,7 +472,7 @@ class StabilityTest:
         return self.counting() if self.equations.by_core and self.equations.model.has_potential else None
 
     def counting(self) -> tuple[Counting, Array] | None:
-        """How the core tells that all eigenvalues are above :data:`CLEAR_OF_ZERO`, and an array that lives as long.
+        """How the core tells that all eigenvalues are above ``CLEAR_OF_ZERO``, and an array that lives as long.
 
         None where there is a place that slides, whose negative eigenvalue does not count.
         """
