@@ -268,7 +268,7 @@ def _add_sweep(commands: Commands) -> None:
     many.add_argument(
         "--batch",
         action="store_true",
-        help="solve what is not out of the ordinary together in threads, a hundred times as fast; for statics without "
+        help="solve what is not out of the ordinary together in threads, some fifty times as fast; for statics without "
         "contact, stops and histories",
     )
     many.add_argument(

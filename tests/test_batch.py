@@ -12,6 +12,10 @@ from sfetcas import Analysis, Expect, SceneError, Settings, dump, load, parametr
 from sfetcas.checks import asked
 from sfetcas.cli import main
 from sfetcas.mathematics.core import core
+from sfetcas.mechanics.accuracy import largest_difference, roughness
+from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.fields import Fields, transferred
+from sfetcas.mechanics.model import assemble
 from sfetcas.parametric import plain
 from sfetcas.parametric.arguments import asked_for
 
@@ -46,6 +50,12 @@ def turned(more):
     return scene
 
 
+def stretching():
+    table = cantilever((0.5, 2.0), analysis={"accuracy": ACCURACY})
+    table["sections"]["s"] |= {"EA": 100.0, "GA2": 60.0, "GA3": 60.0}
+    return made(table)
+
+
 def of(name, **more):
     return load(PROBLEMS / f"{name}.toml").replace({"analysis.steps": [1.0], "analysis.accuracy": ACCURACY, **more})
 
@@ -57,6 +67,11 @@ def drawn(ranges, count=6, seed=0):
 
 SCENES = {
     "plane": (beam, {"loads.tip.value.1": (-12.0, 12.0), "sections.s.EI3": (0.7, 1.5)}, ["nodes.B.position"]),
+    "stretching": (
+        stretching,
+        {"loads.tip.value.1": (1.0, 12.0), "sections.s.EA": (80.0, 120.0)},
+        ["nodes.B.position", "members.m.strain at 0.3"],
+    ),
     "closed": (
         lambda: made({**arch(), "analysis": {"accuracy": ACCURACY}}),
         {"loads.down.value.0": (0.0, 6.0), "sections.s.EI3": (0.9, 1.2)},
@@ -235,6 +250,43 @@ def test_a_row_is_the_model_of_its_case(name):
     pairs = list(zip(values, rows, strict=True))
     assert all(plain_._size_of(*case) == scene.size for case in pairs)
     assert np.isnan([plain_._size_of(case, 1.001 * row) for case, row in pairs]).all()
+
+
+@pytest.mark.parametrize("name", ["closed", "space", "discs", "stretching"])
+def test_meshes_are_changed_and_compared_as_for_single_solves(name):
+    """States on finer meshes, how far they are apart, roughness and errors, of many cases and of one."""
+    make, ranges, quantities = SCENES[name]
+    scene = make()
+    cases = plain.plain_cases(scene, asked_for(scene, list(ranges)), quantities, Settings())
+    values = np.column_stack(list(drawn(ranges, count=3).values()))
+    coarse, fine = cases._level(0), cases._level(1)
+    states, _, found = coarse.followed(coarse.rows(values), None)
+    assert found.all()
+    begun = fine.begun_at(states)
+    solved, _, found = fine.corrected(fine.rows(values), begun)
+    assert found.all()
+    seen = [level.seen_at(cases._meshes[0])(values, there) for level, there in ((coarse, states), (fine, solved))]
+    models = coarse.model, fine.model
+    for i in range(len(values)):
+        one, other, first = (
+            level.arguments.program.state(flat)
+            for level, flat in ((coarse, states[i]), (fine, solved[i]), (fine, begun[i]))
+        )
+        for mine, wanted in zip(
+            vars(first).values(), vars(transferred(models[0], one, models[1])).values(), strict=True
+        ):
+            np.testing.assert_allclose(mine, wanted, rtol=1e-12, atol=1e-13)
+        assert fine.distance(begun, solved)[i] == pytest.approx(
+            fine.prepared.distance(first, other), rel=1e-6, abs=1e-7
+        )
+        own, fields = coarse.arguments.scene_at(values[i]), []
+        for level, state in ((coarse, one), (fine, other)):
+            model = assemble(own, level.model.mesh, assembly=level.model.assembly, scales=level.model.scales)
+            fields.append(Fields(Equations(model), state, model.loading(own.analysis.steps[-1])))
+        apart = np.linalg.norm((seen[0][0] - seen[1][0])[i].reshape(-1, coarse.model.element.axes), axis=1).max()
+        assert apart / scene.size == pytest.approx(largest_difference(*fields), rel=1e-6, abs=1e-13)
+        for (_, rough), field in zip(seen, fields, strict=True):
+            assert rough[i] == pytest.approx(roughness(field).max(), rel=1e-9)
 
 
 def test_warm_starts_lead_to_the_same_where_there_is_one_equilibrium(monkeypatch):

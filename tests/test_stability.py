@@ -421,7 +421,7 @@ def test_loose_rows_by_inverse_iteration_are_those_of_all_singular_values(name):
     point = equations.at(state, equations.model.loading(1.0))
     if not equations.rows:
         return
-    all_squares, all_left, largest = redundancy._all_singular(equations, point)
+    all_squares, all_left, largest = redundancy._all_singular(redundancy._products(equations, point))
     squares, left, _ = redundancy._smallest(equations, point)
     limit = redundancy.SLACK**2 * largest
     loose, few = all_left[:, all_squares < limit], left[:, squares < limit]

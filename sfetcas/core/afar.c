@@ -36,10 +36,8 @@ static int sf_make_run(const sf_model *m, const sf_rules *rules, double *memory,
   if (memory) part = memory + n; \
   n += (count)
   for (i = 0; i < 2; ++i) {
-    PART(run->both[i].state.q, m->components * m->rotations);
-    PART(run->both[i].state.y, m->displacements);
-    PART(run->both[i].state.lam, m->rows);
-    PART(run->both[i].state.unwrapped, m->angles);
+    if (memory) sf_lay_out(m, memory + n, &run->both[i].state);
+    n += sf_state_size(m);
     PART(run->both[i].point.residual, m->total);
     PART(run->both[i].point.scale, m->total);
     PART(run->both[i].point.entries, m->entry_count);

@@ -30,12 +30,9 @@ static int sf_make_place(const sf_model *m, double *memory, sf_place *place) {
   PART(left, m->total);
   PART(solved, m->total);
   PART(work, m->total);
-  PART(state.q, m->components * m->rotations);
-  PART(state.y, m->displacements);
-  PART(state.lam, m->rows);
-  PART(state.unwrapped, m->angles);
 #undef PART
-  return n;
+  if (memory) sf_lay_out(m, memory + n, &place->state);
+  return n + sf_state_size(m);
 }
 
 int sf_follow_size(const sf_model *m) { return sf_make_place(m, NULL, NULL); }
@@ -162,23 +159,16 @@ int sf_follow(const sf_model *m, sf_system *system, sf_way *way, const sf_limits
   return !(way->done >= 1.0);
 }
 
-static void sf_of_row(const sf_model *m, double *row, sf_state *state) {
-  state->q = row;
-  state->y = state->q + m->components * m->rotations;
-  state->lam = state->y + m->displacements;
-  state->unwrapped = state->lam + m->rows;
-}
-
 /* Equilibria of one model for many loads and data: rows of all data that vary, group by group, then of what is given.
  *
  * Each state begins as the one of a case before, or where nothing is followed as it stands in its row; where that does
- * not lead to one that is clearly stable, it is followed from zero loads.  Found are 1 for what was
- * followed, 2 for what was near, 0 for what is left to the caller.  Returns 2 where factors have no room, with the
- * number of cases that are done in cases->done.
+ * not lead to one that is clearly stable, it is followed from zero loads.  Found are 1 for what was followed, 2 for
+ * what was near, 0 for what is left to the caller.  Returns 2 where factors have no room, with the number of cases that
+ * are done in cases->done.
  */
 int sf_solve_cases(const sf_model *m, sf_system *system, sf_cases *cases, const sf_way *way, const sf_limits *limits,
                    const sf_limits *near_limits, const sf_count_of *count, sf_point *point, double *memory) {
-  int numbers = m->given + 3 * way->turning, size = m->components * m->rotations + m->displacements + m->rows + m->angles, g, broken;
+  int numbers = m->given + 3 * way->turning, size = sf_state_size(m), g, broken;
   sf_state state;
   sf_report report;
   sf_place place;
@@ -189,6 +179,7 @@ int sf_solve_cases(const sf_model *m, sf_system *system, sf_cases *cases, const 
     const double *row = cases->row + (size_t)i * numbers;
     double *own = cases->state + (size_t)i * size;
     sf_count_of counted = *count;
+    sf_way own_way = *way;
     /* No case depends on those before it. */
     system->lost = 0;
     counted.shift *= cases->stiffer[i];
@@ -198,13 +189,12 @@ int sf_solve_cases(const sf_model *m, sf_system *system, sf_cases *cases, const 
       sf_copy(cases->datum[g], row, cases->count[g]);
       row += cases->count[g];
     }
-    sf_of_row(m, own, &state);
+    sf_lay_out(m, own, &state);
     if (before >= 0 && cases->found[before]) sf_copy(own, cases->state + (size_t)before * size, size);
-    sf_way own_way = *way;
     own_way.begun = NULL;
+    own_way.rate = row;
     own_way.longest = cases->longest[i];
     if (!cases->follows || (before >= 0 && cases->found[before])) {
-      own_way.rate = row;
       sf_hold(m, &own_way, 1.0, &state);
       broken = sf_correct(m, system, row, NULL, NULL, near_limits, &state, point, place.correcting, &report);
       if (broken) return broken;
@@ -215,7 +205,6 @@ int sf_solve_cases(const sf_model *m, sf_system *system, sf_cases *cases, const 
     }
     if (cases->follows && !cases->found[i]) {
       sf_copy(own, cases->zero, size);
-      own_way.rate = row;
       sf_give_part(m, &own_way, 0.0, place.given);
       sf_at(m, &state, place.given, point);
       broken = sf_follow(m, system, &own_way, limits, &counted, point->entries, &state, point, memory, &report);

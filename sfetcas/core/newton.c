@@ -15,16 +15,26 @@ typedef struct {
   double *step, *right, *both, *given, *results, *matrix, *solving;
 } sf_room;
 
+/* Numbers of a state, and where its parts are among so many. */
+static int sf_state_size(const sf_model *m) {
+  return m->components * m->rotations + m->displacements + m->rows + m->angles;
+}
+
+static void sf_lay_out(const sf_model *m, double *numbers, sf_state *state) {
+  state->q = numbers;
+  state->y = state->q + m->components * m->rotations;
+  state->lam = state->y + m->displacements;
+  state->unwrapped = state->lam + m->rows;
+}
+
 static int sf_make_room(const sf_model *m, double *memory, sf_room *room) {
-  int n = 0, i, c = m->components;
+  int n = 0, i;
 #define PART(place, count) \
   if (memory) place = memory + n; \
   n += (count)
   for (i = 0; i < 3; ++i) {
-    PART(room->state[i].q, c * m->rotations);
-    PART(room->state[i].y, m->displacements);
-    PART(room->state[i].lam, m->rows);
-    PART(room->state[i].unwrapped, m->angles);
+    if (memory) sf_lay_out(m, memory + n, &room->state[i]);
+    n += sf_state_size(m);
   }
   for (i = 0; i < 2; ++i) {
     PART(room->point[i].residual, m->total);

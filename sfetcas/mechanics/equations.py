@@ -451,11 +451,17 @@ class Equations:
         border : Border, optional
             The factor as a further unknown; it is changed there.
         """
-        system = self.solver.of_core
-        if system is None or self._core is None:
+        if self._with_system is None:
             return None
-        there, point, report = self._core.correct(system, _arrays(state), given, tangent, border, limits)
+        core, system = self._with_system
+        there, point, report = core.correct(system, _arrays(state), given, tangent, border, limits)
         return State(*there), self._point_of(point), report
+
+    @property
+    def _with_system(self) -> tuple[CoreModel, CoreSystem] | None:
+        """The core's model and its system for the Newton matrix; None where one of them is not there."""
+        system = self.solver.of_core
+        return None if system is None or self._core is None else (self._core, system)
 
     def followed(
         self, state: State, tangent: Array, way: Way, limits: Limits, counting: Counting | None
@@ -464,10 +470,10 @@ class Equations:
 
         Arguments are those of :meth:`.CoreModel.follow`.
         """
-        system = self.solver.of_core
-        if system is None or self._core is None:
+        if self._with_system is None:
             return None
-        there, reached = self._core.follow(system, _arrays(state), doubles(tangent), way, limits, counting)
+        core, system = self._with_system
+        there, reached = core.follow(system, _arrays(state), doubles(tangent), way, limits, counting)
         return State(*there), reached
 
     def sought(
@@ -477,10 +483,10 @@ class Equations:
 
         Arguments are those of :meth:`.CoreModel.seek`; the tape of ``rules`` is set by :meth:`positive_matrices`.
         """
-        system = self.solver.of_core
-        if system is None or self._core is None:
+        if self._with_system is None:
             return None
-        there, sought = self._core.seek(system, _arrays(state), self.given(loading), rules, whole, left)
+        core, system = self._with_system
+        there, sought = core.seek(system, _arrays(state), self.given(loading), rules, whole, left)
         return State(*there), sought
 
     @functools.cached_property
@@ -490,10 +496,10 @@ class Equations:
 
     def clearly_negative(self, entries: Array, counting: Counting) -> int | None:
         """Number of negative eigenvalues by the core; None without one, where one is near zero, or nobody knows."""
-        system = self.solver.of_core
-        if system is None or self._core is None:
+        if self._with_system is None:
             return None
-        return self._core.negative(system, doubles(entries), counting)
+        core, system = self._with_system
+        return core.negative(system, doubles(entries), counting)
 
     @property
     def by_core(self) -> bool:

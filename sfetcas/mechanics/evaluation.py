@@ -302,6 +302,12 @@ class CoreModel:
         arrays = tuple(c.doubles(part) for part in (q, y, lam, unwrapped))
         return c.State(*(part.ctypes.data for part in arrays)), arrays
 
+    @staticmethod
+    def _changed(state: tuple[Array, Array, Array, Array]) -> tuple[c.State, tuple[Array, Array, Array, Array]]:
+        """A copy of a state that the core changes."""
+        q, y, lam, unwrapped = (np.array(part, dtype=float) for part in state)
+        return c.State(*(part.ctypes.data for part in (q, y, lam, unwrapped))), (q, y, lam, unwrapped)
+
     def evaluate(self, state: tuple[Array, Array, Array, Array], given: Array) -> Parts:
         """Results of all terms at a state (q, y, lam, unwrapped); they are overwritten by the next call."""
         handed, arrays = self._state(*state)
@@ -379,9 +385,7 @@ class CoreModel:
             With it the factor is unknown, too, and changed there.
         limits : Limits
         """
-        q, y, lam, unwrapped = there = tuple(np.array(part, dtype=float) for part in state)
-        handed = c.State(*(part.ctypes.data for part in there))
-        point, report = CorePoint(self), c.Report()
+        (handed, there), point, report = self._changed(state), CorePoint(self), c.Report()
         addresses = (system.address, given.ctypes.data, None if tangent is None else tangent.ctypes.data)
         of_structures = (
             None if border is None else ctypes.addressof(border),
@@ -390,7 +394,7 @@ class CoreModel:
         memory = (self._correcting.ctypes.data, ctypes.addressof(report))
         while self._library.sf_correct(self._address, *addresses, *of_structures, *memory) == NO_ROOM:
             system.make_room()
-        return (q, y, lam, unwrapped), point, report
+        return there, point, report
 
     def follow(
         self,
@@ -418,14 +422,19 @@ class CoreModel:
         counting : Counting, optional
             How eigenvalues are counted; else none are.
         """
-        q, y, lam, unwrapped = there = tuple(np.array(part, dtype=float) for part in state)
-        handed, point, report = c.State(*(part.ctypes.data for part in there)), CorePoint(self), c.Report()
+        point, report, begun = CorePoint(self), c.Report(), c.Way.from_buffer_copy(way)
         counted = None if counting is None else ctypes.addressof(counting)
         addresses = (ctypes.addressof(way), ctypes.addressof(limits), counted, tangent.ctypes.data)
-        rest = (ctypes.addressof(handed), point.address, self._following.ctypes.data, ctypes.addressof(report))
-        while (ended := self._library.sf_follow(self._address, system.address, *addresses, *rest)) == NO_ROOM:
+        rest = (point.address, self._following.ctypes.data, ctypes.addressof(report))
+        while True:
+            handed, there = self._changed(state)
+            addressed = (*addresses, ctypes.addressof(handed), *rest)
+            ended = self._library.sf_follow(self._address, system.address, *addressed)
+            if ended != NO_ROOM:
+                return there, not ended
+            # From the beginning: the matrix of the last step is not known any more.
             system.make_room()
-        return (q, y, lam, unwrapped), not ended
+            ctypes.pointer(way)[0] = begun
 
     def seek(
         self,
@@ -445,14 +454,13 @@ class CoreModel:
         left : int
             Iterations at most.
         """
-        q, y, lam, unwrapped = there = tuple(np.array(part, dtype=float) for part in state)
-        handed, sought, of_rules = c.State(*(part.ctypes.data for part in there)), c.Sought(), ctypes.addressof(rules)
+        (handed, there), sought, of_rules = self._changed(state), c.Sought(), ctypes.addressof(rules)
         memory = np.empty(self._library.sf_seek_size(self._address, of_rules))
         addresses = (system.address, of_rules, given.ctypes.data, whole, left, ctypes.addressof(handed))
         rest = (self._scratch.address, memory.ctypes.data, ctypes.addressof(sought))
         while self._library.sf_seek(self._address, *addresses, *rest) == NO_ROOM:
             system.make_room()
-        return (q, y, lam, unwrapped), sought
+        return there, sought
 
     def convex_of(self, model: Model) -> tuple[int, Array, int, list[Any]] | None:
         """The tape of the positive matrices of elements, memory for it, and where they are among their results.

@@ -200,13 +200,14 @@ class PlainCases:
         for _ in range(MESHES - 1):
             self._meshes.append(self._meshes[-1].refined())
         self._first = self._model(mesh)
-        self.why = self._extraordinary(Prepared(self._first))
+        self.why = self._hindered(Prepared(self._first))
 
     def _model(self, mesh: Mesh) -> Model:
         like = self._levels[0].model.scales if self._levels else None
         return assemble(self.scene, mesh, assembly=self._assembly, scales=like)
 
-    def _extraordinary(self, prepared: Prepared) -> str:
+    def _hindered(self, prepared: Prepared) -> str:
+        """What makes no case of a model plain, in a few words."""
         model, loading = prepared.model, prepared.model.loading(self.scene.analysis.steps[0])
         equations = prepared.equations
         if not model.has_potential or not model.minimisable:
@@ -223,7 +224,7 @@ class PlainCases:
             prepared.correct(equations.start(model.loading(0.0)), model.loading(0.0))
         if equations.redundant or prepared.lacks_slack:
             return "redundant closings"
-        if prepared._test.counting() is None:
+        if prepared.counting is None:
             return "places that slide"
         # What it refuses is told before anything is solved.
         self._level(0)
@@ -359,12 +360,11 @@ class PlainCases:
             smooth = finer_rough <= LEFT_ALONE * TORN
             done = good & smooth & (error <= LEFT_ALONE * self.accuracy)
             if done.any():
-                rows = chosen[done]
                 told = finer.told(p[done], there[done])
                 fine = np.isfinite(told).all(axis=1)
-                known[rows[fine]] = True
-                numbers[rows[fine]], errors[rows[fine]] = told[fine], error[done][fine]
-                residuals[rows] = left[done]
+                solved = chosen[done][fine]
+                known[solved], numbers[solved] = True, told[fine]
+                errors[solved], residuals[solved] = error[done][fine], left[done][fine]
             going = good & ~done
             chosen, here, p, coarse = chosen[going], there[going], p[going], finer
         seconds = np.full(count, (time.perf_counter() - begin) / max(count, 1))
@@ -388,7 +388,6 @@ class _Level:
         # The one in which no entry vanishes by chance.
         self.model = model = self.arguments.model
         self.prepared = Prepared(model)
-        self.states = self.arguments.program.states
         equations, parts = self.prepared.equations, self.arguments.program.sizes
         self._zero = self.arguments.program.flat(equations.start(model.loading(0.0)))
         self._p = ca.MX.sym("arguments", self.arguments.size)
@@ -401,8 +400,7 @@ class _Level:
         self.rows = self._of_rows()
         rest = self.arguments.undeformed(self._p)
         self.told = self._told_by(self.results.expression(self.arguments.program, rest))
-        self.begun_at = _Refining(coarser or model, model)
-        self._numbers = self.prepared.weight, self.prepared._test.softest
+        self._coarser, self._weight, self._counting = coarser, self.prepared.weight, self.prepared.counting
         self.by_core = equations.apart() is not None
         self._shapes = dict[int, Many]()
 
@@ -449,17 +447,19 @@ class _Level:
         program, expressions, model = self.arguments.program, self.arguments.expressions, self.model
         (q, y, _, _), given, n = program.parts, program.given, expressions.points
         moved = ca.reshape(expressions.displacements(q, y, given), expressions.axes, expressions.places)
-        # Of rigid members it is their ends that move farthest.
-        found, gained = [moved], expressions.tangents(q, expressions.retained_places(y, given), given) - given.tangent
+        # Of rigid members it is their ends that move farthest; strains have places of their own, which are none.
+        nodes = [model.segments.place(name) for name in model.nodes]
+        found, gained = (
+            [moved[:, nodes]],
+            expressions.tangents(q, expressions.retained_places(y, given), given) - given.tangent,
+        )
         for name, member in model.scene.members.items():
             if member.type != "flexible":
                 continue
             part, cuts = model.elements_of(name), mesh.cuts[name]
             within = (cuts[:-1, None] + np.diff(cuts)[:, None] * WITHIN).ravel()
-            at, count = (
-                Stations(model.element, model.mesh.cuts[name], np.append(within, cuts[-1])),
-                part.stop - part.start,
-            )
+            at = Stations(model.element, model.mesh.cuts[name], np.append(within, cuts[-1]))
+            count = part.stop - part.start
             own = gained[:, part.start * n : part.stop * n]
             chords = ca.mtimes(own, ca.kron(ca.DM.eye(count), ca.DM.ones(n, 1)))
             begin = ca.cumsum(ca.horzcat(moved[:, model.segments.place(model.segments.ends[name, 0])], chords), 1)
@@ -493,6 +493,12 @@ class _Level:
 
     # -- solving --------------------------------------------------------------------------------------
 
+    @functools.cached_property
+    def begun_at(self) -> _Refining:
+        """Where corrections begin: states on the mesh before, of many cases, interpolated onto this one."""
+        assert self._coarser is not None
+        return _Refining(self._coarser, self.model)
+
     def distance(self, one: Array, other: Array) -> Array:
         """Largest rotations (cases,), rad, between states."""
         components = self.model.element.components
@@ -525,15 +531,15 @@ class _Level:
         return self._solved(rows, states.copy(), None, follows=False)
 
     def _solved(self, rows: Array, states: Array, near: Array | None, *, follows: bool) -> tuple[Array, Array, Array]:
-        prepared, equations = self.prepared, self.prepared.equations
-        apart, counting = equations.apart(), prepared._test.counting()
+        equations = self.prepared.equations
+        apart = equations.apart()
         assert apart is not None
-        assert counting is not None
+        assert self._counting is not None
         core, system = apart
         way, on_way = plain_way()
         way.turning, way.turned = len(self._turned), self._turned.ctypes.data
         from_near = Limits(iterations=25, most=1.5)
-        limits = [limits_for_core(equations, one, prepared.weight) for one in (on_way, from_near)]
+        limits = [limits_for_core(equations, one, self._weight) for one in (on_way, from_near)]
         found, residuals = np.zeros(len(rows), np.intc), np.zeros(len(rows))
         longest, stiffer = self._longest(rows), self._stiffer(rows)
         begun = None if near is None else integers(near)
@@ -552,7 +558,7 @@ class _Level:
             residual=residuals.ctypes.data,
         )
         both = (limits[0][0], limits[1][0])
-        core.solve_cases(system, cases, way, both, counting[0], self._varying)
+        core.solve_cases(system, cases, way, both, self._counting[0], self._varying)
         return states, residuals, found > 0
 
     def _longest(self, rows: Array) -> Array:
@@ -596,6 +602,26 @@ def nearest_before(values: Array) -> Index:
     return found
 
 
+class _Sums:
+    """Sums of a few numbers with the weights of a matrix (sums, numbers), of many cases.
+
+    Of each case in the same order, however many there are: products of large matrices are not.
+    """
+
+    def __init__(self, matrix: Array) -> None:
+        most = int((matrix != 0.0).sum(axis=1).max(initial=1))
+        self._chosen = np.argsort(matrix == 0.0, axis=1, kind="stable")[:, :most]
+        self._weight = np.take_along_axis(matrix, self._chosen, axis=1)
+
+    def __call__(self, numbers: Array) -> Array:
+        """Sums (cases, sums, ...) of numbers (cases, numbers, ...)."""
+        more = (1,) * (numbers.ndim - 2)
+        found = np.zeros((len(numbers), len(self._chosen), *numbers.shape[2:]))
+        for chosen, weight in zip(self._chosen.T, self._weight.T, strict=True):
+            found += weight.reshape(-1, *more) * numbers[:, chosen]
+        return found
+
+
 class _Refining:
     """States of one model on the next finer mesh, of many at once."""
 
@@ -617,10 +643,10 @@ class _Refining:
             own = source.rotations.node_turn[name]
             if number is not None and own is not None:
                 turn[number] = np.eye(n)[own]
-        self._turn = turn
+        self._turn = _Sums(turn)
         sizes = [len(source.positions.unknowns), len(source.row_names), source.unwrapping.count]
         self._bounds = np.cumsum([source.element.components * n, *sizes]).tolist()
-        self._others = self._probed(sizes)
+        self._others = _Sums(self._probed(sizes))
 
     def _probed(self, sizes: list[int]) -> Array:
         """Displacements, multipliers and angles of the target, (numbers, numbers of the source), which are linear."""
@@ -638,8 +664,8 @@ class _Refining:
     def __call__(self, states: Array) -> Array:
         components = self._source.element.components
         q = states[:, : self._bounds[0]].reshape(len(states), -1, components)
-        there = np.einsum("ij,cjk->cik", self._turn, q)
+        there = self._turn(q)
         if self._source.space:
             there /= np.linalg.norm(there, axis=2, keepdims=True)
-        others = states[:, self._bounds[0] :] @ self._others.T
+        others = self._others(states[:, self._bounds[0] :])
         return np.ascontiguousarray(np.concatenate([there.reshape(len(states), -1), others], axis=1))

@@ -249,9 +249,9 @@ class _Following:
         """
         prepared, model, usual = self.prepared, self.prepared.model, (begin, FIRST, tries)
         counted = self.switch_branch and prepared.switches_branch
-        # Angles that motions prescribe are no unknowns of the core.
-        counted_on = np.isnan(model.unwrapping.prescribed(model.rotations.kind, whole)).all() or not whole.turned
-        proportional = self.proportional and counted_on
+        # The core sets rotations that motions prescribe, but no angles.
+        angles = model.unwrapping.prescribed(model.rotations.kind, whole)
+        proportional = self.proportional and (not whole.turned or np.isnan(angles).all())
         known = begin.found.converged and model.has_potential and self.allowed is None and self.refuse is None
         if not (proportional and known):
             return usual

@@ -16,7 +16,7 @@ from ..description.showing import shown
 from ..errors import SolveError, Status
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
-from ..mathematics.core import Way, integers
+from ..mathematics.core import Counting, Way, integers
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt, NLPResult
 from ..mechanics.equations import Equations, Point, State
@@ -202,8 +202,7 @@ class Prepared:
         counted : bool
             Whether eigenvalues are counted, so that the way ends where one is not clearly above zero.
         """
-        equations = self.equations
-        counting = self._test.counting() if counted else None
+        equations, counting = self.equations, self.counting if counted else None
         if not equations.by_core or (equations.rows and equations.redundant) or (counted and counting is None):
             return None
         turned = integers(np.flatnonzero(rate.turn.any(axis=1)))
@@ -215,7 +214,7 @@ class Prepared:
         way.turning, way.turned = len(turned), turned.ctypes.data
         controls, alive = limits_for_core(equations, limits, self._test.weight)
         found = equations.followed(begin.state, begin.point.entries, way, controls, counting and counting[0])
-        del alive, counting
+        del alive
         return found
 
     @functools.cached_property
@@ -258,6 +257,11 @@ class Prepared:
     def weight(self) -> Array:
         """Weight (rotation unknowns,), dimensionless, see :class:`~sfetcas.solvers.stability.StabilityTest`."""
         return self._test.weight
+
+    @property
+    def counting(self) -> tuple[Counting, Array] | None:
+        """How the core counts eigenvalues, see :attr:`.StabilityTest.counting`."""
+        return self._test.counting
 
     @property
     def softest(self) -> float:

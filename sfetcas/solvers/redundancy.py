@@ -49,10 +49,13 @@ def _loose_rows(equations: Equations, point: Point, slack: float) -> Array:
     # A usual size of rows, so that a row without derivative is found also if it is the only one.
     # Without beams rows are of the size of one.
     usual = float((equations.model.beams.weight**2).sum()) or 1.0
-    if equations.rows <= MANY and _clearly_independent(equations, point, usual):
-        return np.zeros((equations.rows, 0))
-    find = _smallest if equations.rows > MANY else _all_singular
-    squares, left, largest = find(equations, point)
+    if equations.rows > MANY:
+        squares, left, largest = _smallest(equations, point)
+    else:
+        products = _products(equations, point)
+        if _clearly_independent(products, usual):
+            return np.zeros((equations.rows, 0))
+        squares, left, largest = _all_singular(products)
     small = left[:, squares < ROUGHLY * max(largest, usual)]
     if not small.size:
         return small
@@ -77,9 +80,9 @@ def changed_by(equations: Equations, point: Point, ways: Array) -> Array:
     return np.array(found).reshape(ways.shape[1], n).T
 
 
-def _all_singular(equations: Equations, point: Point) -> tuple[Array, Array, float]:
+def _all_singular(products: Array) -> tuple[Array, Array, float]:
     """Squares (rows,) of all singular values of the Jacobian, left vectors (rows, rows) and the largest square."""
-    squares, left = np.linalg.eigh(_products(equations, point))
+    squares, left = np.linalg.eigh(products)
     return squares, left, float(squares[-1])
 
 
@@ -91,9 +94,8 @@ def _products(equations: Equations, point: Point) -> Array:
     return np.asarray(rows @ rows.T)
 
 
-def _clearly_independent(equations: Equations, point: Point, usual: float) -> bool:
+def _clearly_independent(products: Array, usual: float) -> bool:
     """Whether no singular value is small, by bounds of the least and the largest that cost little."""
-    products = _products(equations, point)
     try:
         inverse = np.linalg.inv(products)
     except np.linalg.LinAlgError:

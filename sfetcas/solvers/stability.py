@@ -457,26 +457,24 @@ class StabilityTest:
         """Number of negative eigenvalues where the core tells it and none is near zero; see :meth:`counting`."""
         if self.equations.rows and self.equations.redundant:
             return None
-        return None if self._counting is None else self.equations.clearly_negative(point.entries, self._counting[0])
+        return None if self.counting is None else self.equations.clearly_negative(point.entries, self.counting[0])
 
     def is_held(self, undeformed: Callable[[], Point]) -> bool:
         """Whether clearly nothing can move without strain, by the core; False where it does not tell.
 
         Nor where displacements have no stiffness of their own: whether closings determine them it does not know.
         """
-        known = self._n == self.equations.unknowns and self._counting is not None
+        known = self._n == self.equations.unknowns and self.counting is not None
         return known and self._clearly_negative(undeformed()) == 0
 
     @functools.cached_property
-    def _counting(self) -> tuple[Counting, Array] | None:
-        return self.counting() if self.equations.by_core and self.equations.model.has_potential else None
-
     def counting(self) -> tuple[Counting, Array] | None:
         """How the core tells that all eigenvalues are above ``CLEAR_OF_ZERO``, and an array that lives as long.
 
-        None where there is a place that slides, whose negative eigenvalue does not count.
+        None without a core, for loads without potential, and where there is a place that slides, whose negative
+        eigenvalue does not count.
         """
-        if self._apart:
+        if self._apart or not self.equations.by_core or not self.equations.model.has_potential:
             return None
         weight = np.zeros(self.equations.total)
         weight[self._chosen] = self._weights

@@ -100,6 +100,10 @@ def sweep(
         )
     if chunk is not None:
         chunk = whole(chunk, 1, what="number of cases", name="chunk")
+    if workers is not None:
+        workers = whole(workers, 1, MOST_WORKERS, what="number of processes", name="workers")
+    if warm and not batch:
+        raise SceneError("found True without a batch, accepted: warm = True with batch = True", ("warm",))
     single = cases_from(cases).single(scene)
     wanted = wanted_of(scene, quantities)
     _check_together(single, wanted)
@@ -107,16 +111,11 @@ def sweep(
     job = Job(_expecting(scene, wanted), settings, tuple(single.columns), wanted)
     values = np.column_stack(list(single.columns.values()))
     begin = time.perf_counter()
-    if workers is not None:
-        workers = whole(workers, 1, MOST_WORKERS, what="number of processes", name="workers")
-    if warm and not batch:
-        raise SceneError("found True without a batch, accepted: warm = True with batch = True", ("warm",))
     plain = batch_of(scene, job.names, wanted, settings) if batch else None
     if plain is None:
         outcomes, interrupted = _fed(executor, workers, job, values.tolist(), chunk, progress)
         return gathered(scene, single, wanted, Outcomes.of(outcomes), time.perf_counter() - begin, interrupted)
-    threads = cores() if workers is None else workers
-    answers = plain.solve(values, warm=warm, threads=threads, progress=progress)
+    answers = plain.solve(values, warm=warm, threads=workers or cores(), progress=progress)
     left, interrupted = np.flatnonzero(~answers.known), answers.interrupted
     others = [Outcome(NOT_RUN, "interrupted before")] * len(left)
     if len(left) and not interrupted:
