@@ -269,7 +269,7 @@ def test_meshes_are_changed_and_compared_as_for_single_solves(name):
     models = coarse.model, fine.model
     for i in range(len(values)):
         one, other, first = (
-            level.arguments.program.state(flat)
+            level.arguments.program.equations.state(flat)
             for level, flat in ((coarse, states[i]), (fine, solved[i]), (fine, begun[i]))
         )
         for mine, wanted in zip(

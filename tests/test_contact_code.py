@@ -180,7 +180,7 @@ def test_c_has_the_bits_of_the_process(tmp_path):
     codes = []
     for load in ([0.0, -2.0], [0.3, -2.5], [0.0, -1.0], [0.0, 1.0], [-10.0, -20.0]):
         outcome, results = made.solve(np.array(load))
-        given, state, there = np.array(load), np.zeros(made.method.program.states), np.zeros(made.results.size)
+        given, state, there = np.array(load), np.zeros(made.method.states), np.zeros(made.results.size)
         pointers = [x.ctypes.data_as(doubles) for x in (given, state, there)]
         code = library.structure_solve(memory, pointers[0], pointers[1], 0, pointers[2], None)
         codes.append(Code(code))

@@ -24,7 +24,6 @@ from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.mesh import first_mesh
 from sfetcas.mechanics.terms import rotation_gradient
 from sfetcas.solvers import continuation, newton
-from sfetcas.solvers.evaluated import Evaluated
 from sfetcas.solvers.globalised import Globalised
 from sfetcas.solvers.prepared import Prepared
 
@@ -188,15 +187,13 @@ AFAR = [
 @pytest.mark.parametrize("name", AFAR)
 def test_newton_from_afar_takes_the_decisions_of_python(name, monkeypatch):
     """Code, eigenvalues, iterations and state of each solve of an analysis without IPOPT."""
-    compared, solve, seek = [], Globalised.__call__, Evaluated.seek
+    compared, solve, by_core = [], Globalised.__call__, Globalised._by_core
 
-    def checked(method, given, start=None, **more):
-        mine = solve(method, given, start, **more)
-        if not isinstance(method.program, Evaluated):
-            return mine
+    def checked(method, row, start=None, **more):
+        mine = solve(method, row, start, **more)
         with monkeypatch.context() as python:
-            python.setattr(Evaluated, "seek", lambda *_: None)
-            other = solve(method, given, start, **more)
+            python.setattr(Globalised, "_by_core", lambda *_, **__: None)
+            other = solve(method, row, start, **more)
         compared.append(mine)
         assert (mine.code, mine.negative) == (other.code, other.negative)
         # Whether the last step is rounding differs with rounding; what is unstable is found once more and left.
@@ -206,7 +203,9 @@ def test_newton_from_afar_takes_the_decisions_of_python(name, monkeypatch):
 
     monkeypatch.setattr(Globalised, "__call__", checked)
     sought = []
-    monkeypatch.setattr(Evaluated, "seek", lambda *arguments: sought.append(seek(*arguments)) or sought[-1])
+    monkeypatch.setattr(
+        Globalised, "_by_core", lambda *given, **more: sought.append(by_core(*given, **more)) or sought[-1]
+    )
     sfetcas.solve(sfetcas.load(PROBLEMS / f"{name}.toml"), solver="newton")
     # Loads without potential are followed, by whole steps with pivots.
     scene = sfetcas.load(PROBLEMS / "cantilever_follower_force.toml")

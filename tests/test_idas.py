@@ -110,7 +110,7 @@ def any_state(table, seed=0):
     factors = rng.uniform(-1, 1, (3, one.system.layout.factors))
     loading = one.system.loading(factors[0])
     state = State(
-        model.prescribed_rotations(loading),
+        model.prescribed_rotations(loading.turn),
         rng.uniform(-0.1, 0.1, one.states[1]),
         np.zeros(equations.rows),
         np.zeros(0),
@@ -204,7 +204,7 @@ def test_driven_rotations_have_their_centripetal_acceleration_where_their_angle_
     table["motions"] = {"turn": {"node": "A", "rotation": [0.0, 0.0, 1.0], "history": "on"}}
     one = any_state(table)[0]
     model = one.system.model
-    rest = model.prescribed_rotations(model.loading(0.0, 0.0))[one.turning].ravel()
+    rest = model.prescribed_rotations(model.loading(0.0, 0.0).turn)[one.turning].ravel()
     groups = list(one.system.model.groups)
     rate = np.array([2.0 if name == "on" else 0.0 for name in groups])
     zero = np.zeros(len(groups))

@@ -7,10 +7,11 @@ import scenes
 import systems
 from scenes import model_of
 
+from sfetcas.mechanics.beams import ELEMENT_DATA
 from sfetcas.mechanics.equations import Equations
-from sfetcas.mechanics.expressions import Expressions
+from sfetcas.mechanics.expressions import LOADS, Expressions
+from sfetcas.mechanics.inputs import Inputs
 from sfetcas.solvers.program import Program
-from sfetcas.solvers.residuals import relative_residual
 
 NAMES = ["plane_loads", "arch", "four_bar", "guided", "bend_45", "tripod", "hinged_space", "helix"]
 NAMES += ["linked", "small_plane", "sliding_plane", "linked_space", "small_space", "sliding_space"]
@@ -38,52 +39,79 @@ CASES += [(n, a, False) for n in FOLLOWING for a in ("closing", "nodal")]
 @pytest.mark.parametrize(("name", "assembly", "gauss"), CASES)
 def test_same_residual_matrix_and_potential(name, assembly, gauss):
     equations, program, loading, state, _ = made(name, assembly, gauss)
-    point, flat, given = equations.at(state, loading), program.flat(state), program.given_of(loading)
-    residual, size, potential, gaps, entries = (np.array(part).ravel() for part in program.at(flat, given))
+    point, flat, given = equations.at(state, loading), state.flat, program.given_of(loading)
+    expressions = [ca.densify(program.stationarity.residual), program.potential, program.matrix]
+    at = ca.Function("at", [program.state_symbol, program.symbol], expressions)
+    residual, potential, matrix = (np.array(part) for part in at(flat, given))
     whole = np.zeros((equations.total,) * 2)
     whole[equations.row, equations.column] = point.entries
-    assert np.abs(residual - point.residual).max() <= ROUNDING * max(1.0, np.abs(point.residual).max())
-    assert np.abs(np.array(ca.DM(program.sparsity, entries)) - whole).max() <= ROUNDING * np.abs(whole).max()
-    assert size[0] == pytest.approx(relative_residual(equations, point), rel=1e-12)
-    assert gaps[0] == pytest.approx(np.abs(point.residual[equations.unknowns :]).sum(), rel=1e-12)
+    assert np.abs(residual.ravel() - point.residual).max() <= ROUNDING * max(1.0, np.abs(point.residual).max())
+    assert np.abs(matrix - whole).max() <= ROUNDING * np.abs(whole).max()
     if equations.model.has_potential:
-        assert potential[0] == pytest.approx(point.potential, abs=1e-13 * max(1.0, abs(point.potential)))
-        assert [float(value) for value in program.merit(flat, given)] == pytest.approx(
-            [potential[0], gaps[0]], rel=1e-12
-        )
+        assert potential.item() == pytest.approx(point.potential, abs=1e-13 * max(1.0, abs(point.potential)))
 
 
 @pytest.mark.parametrize(("name", "assembly", "gauss"), [case for case in CASES if not case[2]])
 def test_same_states(name, assembly, gauss):
     equations, program, loading, state, random = made(name, assembly, gauss)
-    flat, given = program.flat(state), program.given_of(loading)
+    given, inputs = program.given_of(loading), Inputs(equations)
     step = random.standard_normal(equations.total)
-    begin = program.flat(equations.start(loading))
-    assert np.array(program.begin(given)).ravel() == pytest.approx(begin, abs=ROUNDING)
-    held = program.flat(equations.holding(state, loading))
-    assert np.array(program.hold(flat, given)).ravel() == pytest.approx(held, abs=ROUNDING)
-    moved = program.flat(equations.moved(state, 0.3 * step))
-    assert np.array(program.move(flat, step, 0.3)).ravel() == pytest.approx(moved, abs=1e-13)
-    back = program.state(flat)
-    assert all(np.array_equal(a, b) for a, b in zip(vars(back).values(), vars(state).values(), strict=True))
+    taken = inputs.taken(inputs.of(loading))
+    alike(inputs.begun(taken), equations.start(loading), 0.0)
+    held = equations.holding(state, loading)
+    alike(inputs.holding(state, taken), held, ROUNDING)
+    assert np.array(program.hold(state.flat, given)).ravel() == pytest.approx(held.flat, abs=ROUNDING)
+    moved = equations.moved(state, 0.3 * step)
+    assert np.array(program.move(state.flat, step, 0.3)).ravel() == pytest.approx(moved.flat, abs=1e-13)
+    alike(equations.state(state.flat), state, 0.0)
+
+
+@pytest.mark.parametrize(("name", "assembly", "gauss"), [case for case in CASES if not case[2]])
+def test_rows_of_inputs_are_those_of_expressions(name, assembly, gauss):
+    """With all data and loads as what varies, too; and the equations with the data of a row are those of its model."""
+    equations, program, loading, state, random = made(name, assembly, gauss)
+    row = Inputs(equations).of(loading)
+    assert np.array(program.row(program.given_of(loading))).ravel() == pytest.approx(row, abs=ROUNDING)
+    every = [*ELEMENT_DATA, *LOADS]
+    every += [f"{kind}_{i}" for i in range(len(equations.model.connections)) for kind in ("data", "loads")]
+    whole = Program(program.expressions, dict.fromkeys(every, True))
+    given = whole.given_of(loading)
+    given[: whole.slice_of_loads.start] *= random.uniform(0.9, 1.1, whole.slice_of_loads.start)
+    inputs = Inputs(equations, whole.varying)
+    taken = inputs.taken(np.array(whole.row(given)).ravel())
+    expressions = [ca.densify(whole.stationarity.residual), whole.potential, whole.matrix]
+    at = ca.Function("at", [whole.state_symbol, whole.symbol], expressions)
+    residual, potential, matrix = (np.array(part) for part in at(state.flat, given))
+    point = taken.equations.under(state, taken.given)
+    found = np.zeros((equations.total,) * 2)
+    found[equations.row, equations.column] = point.entries
+    assert np.abs(residual.ravel() - point.residual).max() <= ROUNDING * max(1.0, np.abs(point.residual).max())
+    assert np.abs(matrix - found).max() <= ROUNDING * np.abs(found).max()
+    if equations.model.has_potential:
+        assert potential.item() == pytest.approx(point.potential, abs=1e-13 * max(1.0, abs(point.potential)))
+
+
+def alike(one, other, close):
+    for a, b in zip(vars(one).values(), vars(other).values(), strict=True):
+        assert np.abs(a - b).max(initial=0.0) <= close
 
 
 @pytest.mark.parametrize("gauss", [False, True])
 @pytest.mark.parametrize("name", ["arch", "bend_45", "helix"])
 def test_positive_matrix_is_positive_and_exact_where_nothing_pulls(name, gauss):
-    equations, program, _, state, _ = made(name, "closing", gauss)
-    flat = program.flat(state)
+    equations, _, _, state, _ = made(name, "closing", gauss)
 
-    def matrices(given):
-        found = program.at(flat, given)[4], program.convex(flat, given)
-        n = equations.rotation_unknowns
-        return [np.array(ca.DM(program.sparsity, np.array(part).ravel()))[:n, :n] for part in found]
+    def matrices(state, loading):
+        given = equations.given(loading)
+        for entries in (equations.under(state, given).entries, equations.convex_entries(state, given)):
+            whole = np.zeros((equations.total,) * 2)
+            whole[equations.row, equations.column] = entries
+            yield whole[: equations.rotation_unknowns, : equations.rotation_unknowns]
 
-    exact, positive = matrices(program.given_of(equations.model.loading(50.0)))
+    exact, positive = matrices(state, equations.model.loading(50.0))
     assert np.linalg.eigvalsh(exact)[0] < -1e-3
     assert np.linalg.eigvalsh(positive)[0] >= -1e-12 * np.abs(positive).max()
     # Of the undeformed, unloaded scene it is the matrix itself.
     rest = equations.model.loading(0.0, 0.0)
-    flat = program.flat(equations.start(rest))
-    exact, positive = matrices(program.given_of(rest))
+    exact, positive = matrices(equations.start(rest), rest)
     assert np.abs(exact - positive).max() <= 1e-12 * np.abs(exact).max()

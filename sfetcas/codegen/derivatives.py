@@ -124,7 +124,7 @@ def derivatives(
         message = f"found numbers that change the {changing[0]}, accepted of a program: loads and motions"
         raise SceneError(message, ("arguments",))
     outcome, _ = solver.solve()
-    state = program.state(outcome.state)
+    state = program.equations.state(outcome.state)
     loading = model.loading(scene.analysis.steps[-1])
     prepared = Prepared(model)
     near = prepared.equations.start(loading)

@@ -30,7 +30,7 @@ from ..quoting import (
     shell_word,
 )
 
-__all__ = ["Status", "Writer", "enumerated", "filled", "numbers", "row", "rows", "template"]
+__all__ = ["Status", "Writer", "enumerated", "filled", "numbers", "optimised", "row", "rows", "template"]
 
 Status = tuple[str, int, str]
 """A result code of a call in C: name, number, meaning."""
@@ -38,6 +38,9 @@ Status = tuple[str, int, str]
 WARNINGS = """#if defined(__GNUC__)
 /* What CasADi generates takes arguments that it may not need. */
 #pragma GCC diagnostic ignored "-Wunused-parameter"
+/* Nor is all of the core called. */
+#pragma GCC diagnostic ignored "-Wunused-function"
+#pragma GCC diagnostic ignored "-Wmissing-braces"
 #endif
 """
 
@@ -45,6 +48,15 @@ WARNINGS = """#if defined(__GNUC__)
 def template(name: str) -> str:
     """The text of a template, a file of the folder ``templates``."""
     return resources.files(__package__).joinpath("templates").joinpath(name).read_text()
+
+
+def optimised(level: str, text: str) -> str:
+    """Code in C for which GCC takes another level of optimisation; without one the code as it is."""
+    if not level:
+        return text
+    condition = "#if defined(__GNUC__) && !defined(__clang__)"
+    begin = f'{condition}\n#pragma GCC push_options\n#pragma GCC optimize ("{level}")\n#endif\n'
+    return f"{begin}{text}{condition}\n#pragma GCC pop_options\n#endif\n"
 
 
 def filled(text: str, values: dict[str, object]) -> str:
@@ -98,6 +110,8 @@ class Writer(abc.ABC):
     readme: str
     bodies: tuple[str, ...]
     """Names of the templates of the driver, the C code that calls the generated functions."""
+    optimisation = ""
+    """Level of optimisation of the generated functions, where it is not that of the whole."""
     last: tuple[str, ...] = ("defaults.c",)
     """Names of the templates at its end."""
 
@@ -181,7 +195,7 @@ class Writer(abc.ABC):
             "/* @title@\n *\n * Made by sfetcas; not meant to be read or changed. */",
             '#include "@name@.h"\n',
             WARNINGS,
-            functions_in_c(self.functions, self.name, self.roots),
+            optimised(self.optimisation, functions_in_c(self.functions, self.name, self.roots)),
             "/* ---- tables ---- */\n",
             *self.tables,
             *(template(body) for body in (*self.bodies, *self.last)),

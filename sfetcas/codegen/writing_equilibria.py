@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from ..description.records import counted
-from ..mathematics.source import sparsity_table, table
 from ..parametric.equilibrium import EquilibriumSolver
 from ..parametric.watching import LEAST
 from ..solvers.globalised import MEANINGS, Code
+from .core_in_c import SolverTables, core_in_c
 from .rendering import Status, Writer, filled, row, rows, template
 
 __all__ = ["EquilibriumWriter"]
-
-PIVOTS = "with_pivots_as_they_come"
 
 SLOPES = "`{name}_sensitivities` gives the derivatives of all results by all arguments at a solution.\n\n"
 """Sentence of the README about sensitivities."""
@@ -27,6 +26,8 @@ class EquilibriumWriter(Writer):
 
     header, example, check = "solver.h", "main.c", "check.c"
     loader, readme = "loader.py.in", "README.md"
+    # They are called once in a solve, and would take most of the time to compile.
+    optimisation = "Og"
 
     def __init__(self, solver: EquilibriumSolver, *, sensitivities: bool = False) -> None:
         super().__init__(solver.name, solver.scene, solver.arguments, solver.results)
@@ -35,23 +36,12 @@ class EquilibriumWriter(Writer):
 
     @property
     def functions(self) -> list[ca.Function]:
-        """The functions of the solver and its program, and those that compute the results."""
+        """The functions of the solver, and those that compute the results."""
         solver, program = self.solver, self.arguments.program
-        found = [solver.prepare, solver.output, program.begin, program.hold, program.move, program.at, program.left]
-        if self.model.downhill:
-            found += [program.merit, program.convex]
+        found = [solver.prepare, solver.output, program.row]
         if solver.margins is not None:
             found.append(solver.margins)
-        if self.model.has_potential:
-            found.append(_pivots())
-        if solver.method.pivoted:
-            found.append(program.linear)
         return [*found, solver.sensitivities] if self._sensitivities else found
-
-    @property
-    def roots(self) -> set[str]:
-        """All functions, with CasADi's factorisation and solution in place of the one that solves linear systems."""
-        return super().roots - {PIVOTS} | {"casadi_ldl", "casadi_ldl_solve"}
 
     @property
     def statuses(self) -> list[Status]:
@@ -61,19 +51,8 @@ class EquilibriumWriter(Writer):
 
     @property
     def states(self) -> int:
-        """Length of a state of the program."""
-        return self.arguments.program.states
-
-    @property
-    def _sizes(self) -> dict[str, int]:
-        program = self.arguments.program
-        lower = self._lower[0].nnz() if self.model.has_potential else 0
-        return {
-            "sz_given": max(1, program.symbol.shape[0]),
-            "sz_total": max(1, program.expressions.total),
-            "sz_entries": max(1, program.sparsity.nnz()),
-            "sz_lower": max(1, lower),
-        }
+        """Length of a state."""
+        return self.solver.method.states
 
     @property
     def _margins(self) -> int:
@@ -82,10 +61,23 @@ class EquilibriumWriter(Writer):
         return 0 if margins is None else int(margins.numel_out(0))
 
     @property
+    def _sizes(self) -> dict[str, int]:
+        tables = self._tables
+        return {
+            "sz_given": max(1, self.arguments.program.symbol.shape[0]),
+            "sz_numbers": max(1, tables.numbers),
+            "sz_whole": max(1, tables.whole),
+        }
+
+    @property
     def memory(self) -> int:
         """Number of doubles for states, residuals, matrices and factors."""
-        given, total, entries, lower = self._sizes.values()
-        return 2 * given + 4 * max(1, self.states) + 8 * total + 5 * entries + lower + self._margins
+        given, numbers, whole = self._sizes.values()
+        return given + numbers + whole // 2 + 1 + self._margins
+
+    @functools.cached_property
+    def _tables(self) -> SolverTables:
+        return SolverTables(self.solver)
 
     @property
     def own(self) -> dict[str, object]:
@@ -112,60 +104,11 @@ class EquilibriumWriter(Writer):
         return {"functions": functions, "error_estimate": self.solver.answer.certificate.error_estimate}
 
     @property
-    def _lower(self) -> tuple[ca.Sparsity, list[int]]:
-        """Pattern of the factor of the matrix without pivoting, and the order of the unknowns in it."""
-        found, order = self.arguments.program.sparsity.ldl(True)
-        return found, list(order)
-
-    @property
     def tables(self) -> list[str]:
-        """Sizes, rules of the method, ranges of arguments, start, and patterns of the matrix."""
-        solver, program = self.solver, self.arguments.program
-        equations = program.equations
-        moments, loads = program.slice_of_moments, program.slice_of_loads
-        begun = solver.followed_from
-        constants: dict[str, object] = {
-            "TOTAL": program.expressions.total,
-            "UNKNOWNS": equations.unknowns,
-            "TURNING": equations.rotation_unknowns,
-            "ENTRIES": program.sparsity.nnz(),
-            "STATE": program.states,
-            "MULTIPLIERS": program.states - program.expressions.layout.unwrapped - equations.rows,
-            "GIVEN": program.symbol.shape[0],
-            "LOADS": loads.start,
-            "MOMENT": moments.start,
-            "MOMENTS": moments.stop - moments.start,
-            "SYMMETRIC": int(self.model.has_potential),
-            "PIVOTED": int(solver.method.pivoted),
-            "MINIMISABLE": int(self.model.minimisable),
-            "DOWNHILL": int(self.model.downhill),
-            "SLIDING": self.model.mesh.sliding,
-            "BEGUN": int(begun is not None),
-            "MARGINS": self._margins,
-            "LEAST": LEAST,
-            "STARTED": int(solver.start is not None),
-            **{key.upper(): value for key, value in vars(solver.rules).items()},
-        }
-        found = [
-            "\n".join(f"#define SF_{key} {value!r}" for key, value in constants.items()) + "\n",
-            *self.ranges,
-            table("sf_diagonal", solver.method.diagonal, "int"),
-            table("sf_mass", solver.method.mass),
-            table("sf_soft", solver.method.soft),
-            table("sf_start", solver.start if solver.start is not None else np.zeros(0)),
-        ]
-        if begun is not None:
-            found.append(table("sf_begun", begun[0]))
-        if self.model.downhill:
-            found.append(table("sf_seed", solver.method.seed))
-        if self.model.has_potential:
-            lower, order = self._lower
-            found += [
-                sparsity_table("sf_pattern", program.sparsity),
-                sparsity_table("sf_lower", lower),
-                table("sf_order", np.array(order), "int"),
-            ]
-        return found
+        """The core, ranges of arguments, and all that it takes of the model."""
+        constants = self._tables.constants | {"MARGINS": self._margins, "LEAST": LEAST}
+        defined = "\n".join(f"#define SF_{key} {value!r}" for key, value in constants.items()) + "\n"
+        return [*core_in_c(), defined, *self.ranges, *self._tables.texts]
 
     @property
     def cases(self) -> dict[str, object]:
@@ -185,9 +128,3 @@ class EquilibriumWriter(Writer):
             "case_results": rows(results),
             "units": row(self.units(results)),
         }
-
-
-def _pivots() -> ca.Function:
-    """A small function that factorises without pivoting, so that CasADi writes the C code which the driver calls."""
-    matrix, b = ca.MX.sym("matrix", 2, 2), ca.MX.sym("b", 2)
-    return ca.Function(PIVOTS, [matrix, b], [ca.solve(matrix, b, "ldl")])

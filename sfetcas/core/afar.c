@@ -19,18 +19,27 @@ typedef struct {
   double size, gaps;
 } sf_here;
 
-/* What a call works on. */
+/* What a call works on; room, seed: whether they were missed; limited: whether no node turns far in a step. */
 typedef struct {
   const sf_model *m;
   sf_system *system;
   const sf_rules *rules;
+  const sf_inputs *inputs;
   const double *given;
   sf_here *here, *there, both[2];
-  double *target, *matrix, *positive, *step, *x, *y, *rest, *b, *solving, *in;
-  int left, room;
+  double *target, *matrix, *positive, *step, *x, *y, *rest, *b, *solving, *in, *slots, *row, *reached, *kept;
+  int left, room, seed, limited;
 } sf_run_of;
 
-static int sf_make_run(const sf_model *m, const sf_rules *rules, double *memory, sf_run_of *run) {
+/* Numbers of a row of inputs. */
+static int sf_row_size(const sf_model *m, const sf_inputs *inputs) {
+  int n = m->given + 3 * inputs->turning + m->angles, g;
+  for (g = 0; g < inputs->groups; ++g) n += inputs->count[g];
+  return n;
+}
+
+static int sf_make_run(const sf_model *m, const sf_rules *rules, const sf_inputs *inputs, double *memory,
+                       sf_run_of *run) {
   int n = 0, i;
 #define PART(part, count) \
   if (memory) part = memory + n; \
@@ -52,13 +61,18 @@ static int sf_make_run(const sf_model *m, const sf_rules *rules, double *memory,
   PART(run->b, m->total);
   PART(run->solving, m->total);
   PART(run->in, 8 * (rules->convex ? rules->convex->results : 0));
+  PART(run->slots, 8 * (rules->convex ? rules->convex->slots : 0));
+  PART(run->row, sf_row_size(m, inputs));
+  PART(run->reached, sf_state_size(m));
+  PART(run->kept, sf_state_size(m));
 #undef PART
   return n;
 }
 
-int sf_seek_size(const sf_model *m, const sf_rules *rules) {
+/* Numbers of memory that a call takes. */
+int sf_find_size(const sf_model *m, const sf_rules *rules, const sf_inputs *inputs) {
   sf_run_of none;
-  return sf_make_run(m, rules, NULL, &none);
+  return sf_make_run(m, rules, inputs, NULL, &none);
 }
 
 static int sf_is_finite(double x) { return x - x == 0.0; }
@@ -165,7 +179,7 @@ static void sf_convex(sf_run_of *run) {
     for (l = 0; l < lanes; ++l)
       sf_gather(m, group, 1, first + (l < left ? l : left - 1), &run->here->state, run->given, p, &work, work.in + l,
                 lanes);
-    sf_lanes_run(lanes, tape, work.in, run->in, left, run->rules->slots);
+    sf_lanes_run(lanes, tape, work.in, run->in, left, run->slots);
     for (l = 0; l < left; ++l)
       for (k = 0; k < tape->results; ++k)
         p->result[group->result + (size_t)(first + l) * group->tape->results + run->rules->stiffness + k] =
@@ -247,7 +261,7 @@ static int sf_descended(sf_run_of *run, int *negative) {
     if (!found || *negative != 0) found = sf_downwards(run);
     length = found ? sf_length(run, run->step) : HUGE_VAL;
     if (!sf_is_finite(length)) return SF_STALLED;
-    most = rules->free ? rules->turn : HUGE_VAL;
+    most = run->limited ? rules->turn : HUGE_VAL;
     most /= length > SF_TINY ? length : SF_TINY;
     scale = 4.0 * scale < 1.0 ? 4.0 * scale : 1.0;
     if (most < scale) scale = most;
@@ -262,6 +276,10 @@ static void sf_nudged(sf_run_of *run) {
   const sf_rules *rules = run->rules;
   double firm = rules->firm, length, up, down, larger;
   int i, sweep;
+  if (!rules->seed) {
+    run->seed = 1;
+    return;
+  }
   sf_look(run, run->here);
   while (sf_firm(run, run->here->point.entries, firm) != 0 && firm < SF_FIRMEST) firm *= rules->firmer;
   /* From a shape that a rule of the scene gives: what comes of it lies to the same side. */
@@ -317,45 +335,172 @@ static int sf_corrected(sf_run_of *run, int most, int *negative) {
   return run->here->size <= rules->converged ? SF_SOLVED : SF_ITERATIONS;
 }
 
-/* An equilibrium from a state, in its place: downhill and out of what is unstable, or by whole steps alone.
+/* By whole steps to an equilibrium that need not be left. */
+static int sf_by_whole_steps(sf_run_of *run, int *negative, int *status) {
+  const sf_rules *rules = run->rules;
+  *status = sf_corrected(run, rules->corrections, negative);
+  if (*status != SF_SOLVED) return 0;
+  if (*negative <= 0 || !rules->minimisable) return 1;
+  *status = SF_UNSTABLE;
+  return rules->escapes == 0 || !rules->downhill;
+}
+
+/* Downhill from a state, and out of what is unstable; by whole steps where nothing is least. */
+static int sf_from(sf_run_of *run, int *negative) {
+  const sf_rules *rules = run->rules;
+  int escape, status;
+  if (!rules->downhill) return sf_corrected(run, run->left, negative);
+  for (escape = 0; escape <= rules->escapes; ++escape) {
+    status = sf_descended(run, negative);
+    if (run->room || run->seed || status != SF_SOLVED || *negative <= 0) return status;
+    if (escape < rules->escapes) sf_nudged(run);
+  }
+  return SF_UNSTABLE;
+}
+
+/* Data of a row for the model, and what else it has: given, then vectors, then angles. */
+static void sf_take(sf_run_of *run, const double *row) {
+  const sf_inputs *inputs = run->inputs;
+  int g;
+  for (g = 0; g < inputs->groups; ++g) {
+    sf_copy(inputs->datum[g], row, inputs->count[g]);
+    row += inputs->count[g];
+  }
+  run->given = row;
+}
+
+/* A state (numbers,) with what is prescribed by the row that was taken; all angles where it is the undeformed one. */
+static void sf_begin(sf_run_of *run, const double *numbers, int undeformed) {
+  const sf_model *m = run->m;
+  const sf_inputs *inputs = run->inputs;
+  const double *vector = run->given + m->given, *angle = vector + 3 * inputs->turning;
+  sf_state *state = &run->here->state;
+  int i, k;
+  sf_copy(state->q, numbers, sf_state_size(m));
+  for (i = 0; m->space && !undeformed && i < m->rotations; ++i) {
+    /* A start that somebody gives may have quaternions that are not normalised. */
+    double *q = state->q + (size_t)4 * i, size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (k = 0; k < 4; ++k) q[k] /= size;
+  }
+  sf_prescribe(m, inputs->turning, inputs->turned, vector, state);
+  for (i = 0; i < m->angles; ++i)
+    if (undeformed || inputs->held[i]) state->unwrapped[i] = angle[i];
+}
+
+/* A row with a share of all loads and motions, or on the way to it from where it was begun; taken. */
+static void sf_share(sf_run_of *run, const double *row, double share) {
+  const sf_inputs *inputs = run->inputs;
+  int i, g, n = sf_row_size(run->m, inputs), data = 0;
+  if (inputs->begun) {
+    for (i = 0; i < n; ++i) run->row[i] = inputs->begun[i] + share * (row[i] - inputs->begun[i]);
+  } else {
+    for (g = 0; g < inputs->groups; ++g) data += inputs->count[g];
+    sf_copy(run->row, row, data);
+    for (i = data; i < n; ++i) run->row[i] = share * row[i];
+  }
+  sf_take(run, run->row);
+}
+
+/* Where the loads lead, growing from zero, or what is given as it becomes another. */
+static int sf_followed(sf_run_of *run, const double *row, int *negative) {
+  const sf_rules *rules = run->rules;
+  const sf_inputs *inputs = run->inputs;
+  int status = SF_ITERATIONS, numbers = sf_state_size(run->m);
+  double share = 0.0, step = 1.0;
+  sf_share(run, row, 0.0);
+  sf_begin(run, inputs->begun ? inputs->reached : inputs->rest, !inputs->begun);
+  sf_copy(run->reached, run->here->state.q, numbers);
+  while (share < 1.0 && run->left && !run->room) {
+    double next = share + step < 1.0 ? share + step : 1.0;
+    sf_share(run, row, next);
+    sf_begin(run, run->reached, 0);
+    status = sf_corrected(run, rules->corrections, negative);
+    if (status == SF_SOLVED) {
+      share = next;
+      step *= 2.0;
+      sf_copy(run->reached, run->here->state.q, numbers);
+      continue;
+    }
+    step *= 0.5;
+    if (step < rules->shortest) break;
+  }
+  if (share < 1.0) return status == SF_SOLVED ? SF_ITERATIONS : status;
+  sf_take(run, row);
+  if (*negative > 0 && rules->escapes > 0 && rules->downhill) {
+    sf_nudged(run);
+    return run->seed ? status : sf_from(run, negative);
+  }
+  return status;
+}
+
+static int sf_all_finite(const double *x, int n) {
+  int i;
+  for (i = 0; i < n; ++i)
+    if (!sf_is_finite(x[i])) return 0;
+  return 1;
+}
+
+/* An equilibrium for a row of inputs, in place of a state (numbers,).
  *
- * Returns 2 where factors have no room, with nothing changed; see sf_sought for how it ended else.
+ * It begins at the undeformed state; or with begins at that state, which where that is 2 is an equilibrium for other
+ * values, from which whole steps are tried first.  Returns 2 where factors have no room, and 3 where a seed is needed
+ * and there is none, with nothing changed but data; see sf_sought for how it ended else.
  */
-int sf_seek(const sf_model *m, sf_system *system, const sf_rules *rules, const double *given, int whole, int left,
-            sf_state *state, sf_point *point, double *memory, sf_sought *sought) {
+int sf_find(const sf_model *m, sf_system *system, const sf_rules *rules, const sf_inputs *inputs, const double *row,
+            int begins, double *state, sf_point *point, double *memory, sf_sought *sought) {
   sf_run_of run;
-  int i, escape, negative = SF_NOT_DEFINED, status = SF_UNSTABLE;
-  sf_make_run(m, rules, memory, &run);
+  int i, g, k, numbers = sf_state_size(m), negative = SF_NOT_DEFINED, status = SF_BAD_ARGUMENT;
+  sf_make_run(m, rules, inputs, memory, &run);
   run.m = m;
   run.system = system;
   run.rules = rules;
-  run.given = given;
-  run.left = left;
-  run.room = 0;
+  run.inputs = inputs;
+  run.left = rules->iterations;
+  run.room = run.seed = 0;
+  run.limited = 1;
   run.here = &run.both[0];
   run.there = &run.both[1];
+  run.here->size = HUGE_VAL;
   for (i = 0; i < 2; ++i) {
     run.both[i].point.result = point->result;
     run.both[i].point.place = point->place;
     run.both[i].point.pull = point->pull;
     run.both[i].point.work = point->work;
   }
-  sf_copy_state(m, state, &run.here->state);
-  if (whole) {
-    status = sf_corrected(&run, whole, &negative);
-  } else {
-    for (escape = 0; escape <= rules->escapes && !run.room; ++escape) {
-      status = sf_descended(&run, &negative);
-      if (status != SF_SOLVED || negative <= 0) break;
-      status = SF_UNSTABLE;
-      if (escape < rules->escapes) sf_nudged(&run);
+  if (sf_all_finite(row, sf_row_size(m, inputs)) && (!begins || sf_all_finite(state, numbers))) {
+    sf_take(&run, row);
+    for (g = 0; g < inputs->couples; ++g) {
+      const sf_group *group = m->group + inputs->couple[g];
+      for (k = 0; k < group->terms * group->loads; ++k)
+        if (run.given[group->load + k] != 0.0) run.limited = 0;
     }
+    sf_begin(&run, begins ? state : inputs->rest, !begins);
+    if (begins < 2 || !sf_by_whole_steps(&run, &negative, &status)) {
+      if (begins == 2) sf_begin(&run, state, 0);
+      status = sf_from(&run, &negative);
+    }
+    if (status != SF_SOLVED && status != SF_UNSTABLE && run.left && !run.room && !run.seed) {
+      double size = run.here->size;
+      int before = negative, followed;
+      sf_copy(run.kept, run.here->state.q, numbers);
+      followed = sf_followed(&run, row, &negative);
+      if (followed == SF_SOLVED) {
+        status = followed;
+      } else {
+        sf_copy(run.here->state.q, run.kept, numbers);
+        run.here->size = size;
+        negative = before;
+      }
+    }
+    if (run.room) return 2;
+    if (run.seed) return 3;
+    if (rules->minimisable && status == SF_SOLVED && negative > 0) status = SF_UNSTABLE;
+    if (status <= SF_UNSTABLE && !sf_all_finite(run.here->state.q, numbers)) status = SF_NOT_FINITE;
+    sf_copy(state, run.here->state.q, numbers);
   }
-  if (run.room) return 2;
-  sf_copy_state(m, &run.here->state, state);
   sought->status = status;
-  sought->negative = negative;
-  sought->left = run.left;
+  sought->negative = status <= SF_UNSTABLE ? negative : SF_NOT_DEFINED;
+  sought->iterations = rules->iterations - run.left;
   sought->residual = run.here->size;
   return 0;
 }

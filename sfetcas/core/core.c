@@ -1,8 +1,8 @@
 /* All of the core as one unit. */
 
 #include "tape.c"
-#include "equations.c"
 #include "states.c"
+#include "equations.c"
 #include "factors.c"
 #include "newton.c"
 #include "follow.c"
@@ -28,6 +28,8 @@ int sf_sizes(int *sizes) {
   sizes[13] = (int)sizeof(sf_cases);
   sizes[14] = (int)sizeof(sf_rules);
   sizes[15] = (int)sizeof(sf_sought);
-  sizes[16] = SF_OPERATIONS;
+  sizes[16] = (int)sizeof(sf_inputs);
+  sizes[17] = (int)sizeof(sf_stretch);
+  sizes[18] = SF_OPERATIONS;
   return 0;
 }

@@ -11,7 +11,7 @@
 #ifndef SFETCAS_CORE_H
 #define SFETCAS_CORE_H
 
-#define SF_VERSION 3
+#define SF_VERSION 4
 
 #ifdef _WIN32
 #define SF_PUBLIC __declspec(dllexport)
@@ -23,12 +23,18 @@
 
 /* An operation on numbers in slots; SF_IN, SF_OUT and SF_CONSTANT have the other number in a. */
 typedef struct {
-  int operation, to, a, b;
+  int to, a, b;
 } sf_operation;
+
+/* So many operations of one kind, one after the other. */
+typedef struct {
+  int operation, count;
+} sf_stretch;
 
 /* A function of one term: from its arguments, one after the other, to its results, one after the other. */
 typedef struct {
-  int operations, slots, arguments, results, constants;
+  int stretches, slots, arguments, results, constants;
+  const sf_stretch *stretch;
   const sf_operation *code;
   const double *constant;
 } sf_tape;
@@ -117,6 +123,8 @@ typedef struct {
 
 SF_PUBLIC int sf_version(void);
 SF_PUBLIC int sf_sizes(int *sizes);
+SF_PUBLIC int sf_arrange(int operations, const int *code, sf_stretch *stretch, sf_operation *arranged, int *memory,
+                         int *needed);
 SF_PUBLIC int sf_run(const sf_tape *tape, int count, const double *arguments, double *results, double *work);
 SF_PUBLIC int sf_tape_work(const sf_tape *tape);
 SF_PUBLIC int sf_work_size(const sf_model *model);
@@ -210,29 +218,45 @@ SF_PUBLIC int sf_correct(const sf_model *model, sf_system *system, const double 
 #define SF_ITERATIONS 2
 #define SF_STALLED 3
 #define SF_NOT_FINITE 4
+#define SF_BAD_ARGUMENT 5
 #define SF_NOT_DEFINED (-1) /* number of negative eigenvalues where loads have no potential */
+
+/* What an equilibrium depends on, in a row of numbers: data of groups of terms that vary, group by group; what is given;
+ * vectors of rotations that are prescribed; and values near which angles count turns in the undeformed state. */
+typedef struct {
+  int groups;
+  const int *count;      /* (groups,) of how many numbers their data are */
+  double *const *datum;  /* (groups,) where the model has them */
+  int turning;
+  const int *turned;     /* (turning,) numbers of the rotations that are prescribed */
+  const int *held;       /* (angles,) whether angles are, too */
+  int couples;
+  const int *couple;     /* (couples,) groups of terms whose loads are moments */
+  const double *rest;    /* (numbers of a state,) the undeformed one */
+  const double *begun, *reached; /* a row and its equilibrium, from which others are followed; NULL: from zero loads */
+} sf_inputs;
 
 /* What controls the method: Rules of sfetcas/solvers/globalised.py, and what follows from a model. */
 typedef struct {
-  const double *mass, *sides, *seed; /* (total,) of shifts, of the softness, start of the lowest mode */
+  const double *mass, *sides, *seed; /* (total,) of shifts, of the softness, start of the lowest mode or NULL */
   const sf_tape *convex;             /* positive matrices of elements; NULL: none */
-  double *slots;                     /* memory that its tape takes */
   int stiffness;                     /* where matrices begin among the results of an element */
-  int rounds, halvings, escapes, sweeps;
-  int symmetric, pivoted, free, sliding;
+  int iterations, corrections, rounds, halvings, escapes, sweeps;
+  int symmetric, minimisable, downhill, pivoted, sliding;
   double converged, rounding, gain, turn, near, proximal, soft, hard, firm, firmer, left, armijo, noise, nudge, far;
-  double level, least;
+  double shortest, level, least;
 } sf_rules;
 
-/* How it ended; left: iterations that were not needed. */
+/* How it ended. */
 typedef struct {
-  int status, negative, left;
+  int status, negative, iterations;
   double residual;
 } sf_sought;
 
-SF_PUBLIC int sf_seek_size(const sf_model *model, const sf_rules *rules);
-SF_PUBLIC int sf_seek(const sf_model *model, sf_system *system, const sf_rules *rules, const double *given, int whole,
-                      int left, sf_state *state, sf_point *point, double *memory, sf_sought *sought);
+SF_PUBLIC int sf_find_size(const sf_model *model, const sf_rules *rules, const sf_inputs *inputs);
+SF_PUBLIC int sf_find(const sf_model *model, sf_system *system, const sf_rules *rules, const sf_inputs *inputs,
+                      const double *row, int begins, double *state, sf_point *point, double *memory,
+                      sf_sought *sought);
 
 /* ---- loads that grow, and many cases ---------------------------------------------------------------- */
 
@@ -262,7 +286,7 @@ typedef struct {
   int groups;               /* of terms with data that vary */
   const int *count;         /* (groups,) of how many numbers */
   double *const *datum;     /* (groups,) where the model has them */
-  const double *row, *zero; /* (cases, data and given); the state without loads */
+  const double *row, *zero; /* (cases, numbers of sf_inputs); the state without loads */
   const int *near;          /* (cases,) a case before from which each begins, -1: none; or NULL */
   const double *longest;    /* (cases,) that of the way of each */
   const double *stiffer;    /* (cases,) by which the shift of eigenvalues is larger */

@@ -210,3 +210,15 @@ int sf_slope(const sf_model *m, const sf_state *s, const double *rate, const sf_
   for (i = 0; i < m->closings; ++i) slope[m->unknowns + i] += rate[m->opening + i];
   return 0;
 }
+
+/* Largest residual over its scale; nan if one is. */
+double sf_relative(const sf_model *m, const sf_point *p, double least) {
+  double most = 0.0;
+  int i;
+  for (i = 0; i < m->total; ++i) {
+    double share = fabs(p->residual[i]) / (p->scale[i] > least ? p->scale[i] : least);
+    if (share != share) return share;
+    if (share > most) most = share;
+  }
+  return most;
+}

@@ -108,10 +108,7 @@ static void sf_hold(const sf_model *m, const sf_way *way, double part, sf_state 
     size_t at = (size_t)m->given + 3 * (size_t)i;
     double turn[3];
     for (k = 0; k < 3; ++k) turn[k] = (way->begun ? way->begun[at + k] : 0.0) + part * way->rate[at + k];
-    if (m->space)
-      sf_turned(turn, state->q + (size_t)4 * way->turned[i]);
-    else
-      state->q[way->turned[i]] = turn[2];
+    sf_prescribe(m, 1, way->turned + i, turn, state);
   }
 }
 
@@ -159,7 +156,7 @@ int sf_follow(const sf_model *m, sf_system *system, sf_way *way, const sf_limits
   return !(way->done >= 1.0);
 }
 
-/* Equilibria of one model for many loads and data: rows of all data that vary, group by group, then of what is given.
+/* Equilibria of one model for many loads and data, whose rows are those of sf_inputs.
  *
  * Each state begins as the one of a case before, or where nothing is followed as it stands in its row; where that does
  * not lead to one that is clearly stable, it is followed from zero loads.  Found are 1 for what was followed, 2 for
@@ -168,7 +165,7 @@ int sf_follow(const sf_model *m, sf_system *system, sf_way *way, const sf_limits
  */
 int sf_solve_cases(const sf_model *m, sf_system *system, sf_cases *cases, const sf_way *way, const sf_limits *limits,
                    const sf_limits *near_limits, const sf_count_of *count, sf_point *point, double *memory) {
-  int numbers = m->given + 3 * way->turning, size = sf_state_size(m), g, broken;
+  int numbers = m->given + 3 * way->turning + m->angles, size = sf_state_size(m), g, broken;
   sf_state state;
   sf_report report;
   sf_place place;

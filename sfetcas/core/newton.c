@@ -6,26 +6,12 @@
 
 #include "core.h"
 
-#define SF_TINY 1e-300
-
 /* Where the parts of the memory of a correction begin: three states, two points, and vectors. */
 typedef struct {
   sf_state state[3];
   sf_point point[2];
   double *step, *right, *both, *given, *results, *matrix, *solving;
 } sf_room;
-
-/* Numbers of a state, and where its parts are among so many. */
-static int sf_state_size(const sf_model *m) {
-  return m->components * m->rotations + m->displacements + m->rows + m->angles;
-}
-
-static void sf_lay_out(const sf_model *m, double *numbers, sf_state *state) {
-  state->q = numbers;
-  state->y = state->q + m->components * m->rotations;
-  state->lam = state->y + m->displacements;
-  state->unwrapped = state->lam + m->rows;
-}
 
 static int sf_make_room(const sf_model *m, double *memory, sf_room *room) {
   int n = 0, i;
@@ -53,27 +39,6 @@ static int sf_make_room(const sf_model *m, double *memory, sf_room *room) {
 }
 
 int sf_correct_size(const sf_model *m) { return sf_make_room(m, NULL, NULL); }
-
-static void sf_copy(double *to, const double *from, int n) { memcpy(to, from, (size_t)n * sizeof(double)); }
-
-static void sf_copy_state(const sf_model *m, const sf_state *from, sf_state *to) {
-  sf_copy(to->q, from->q, m->components * m->rotations);
-  sf_copy(to->y, from->y, m->displacements);
-  sf_copy(to->lam, from->lam, m->rows);
-  sf_copy(to->unwrapped, from->unwrapped, m->angles);
-}
-
-/* Largest residual over its scale; nan if one is. */
-double sf_relative(const sf_model *m, const sf_point *p, double least) {
-  double most = 0.0;
-  int i;
-  for (i = 0; i < m->total; ++i) {
-    double share = fabs(p->residual[i]) / (p->scale[i] > least ? p->scale[i] : least);
-    if (share != share) return share;
-    if (share > most) most = share;
-  }
-  return most;
-}
 
 /* Whether the residual is small beside the largest forces that act, not only beside stiffness. */
 static int sf_balanced(const sf_model *m, const sf_point *p, double share) {

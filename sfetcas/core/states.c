@@ -2,11 +2,34 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "core.h"
 #include "elementary.h"
 
+#define SF_TINY 1e-300
 #define SF_PI 3.14159265358979323846
+
+/* Numbers of a state, and where its parts are among so many. */
+static int sf_state_size(const sf_model *m) {
+  return m->components * m->rotations + m->displacements + m->rows + m->angles;
+}
+
+static void sf_lay_out(const sf_model *m, double *numbers, sf_state *state) {
+  state->q = numbers;
+  state->y = state->q + m->components * m->rotations;
+  state->lam = state->y + m->displacements;
+  state->unwrapped = state->lam + m->rows;
+}
+
+static void sf_copy(double *to, const double *from, int n) { memcpy(to, from, (size_t)n * sizeof(double)); }
+
+static void sf_copy_state(const sf_model *m, const sf_state *from, sf_state *to) {
+  sf_copy(to->q, from->q, m->components * m->rotations);
+  sf_copy(to->y, from->y, m->displacements);
+  sf_copy(to->lam, from->lam, m->rows);
+  sf_copy(to->unwrapped, from->unwrapped, m->angles);
+}
 
 static void sf_product(const double *a, const double *b, double *c) {
   c[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
@@ -111,4 +134,14 @@ int sf_move(const sf_model *m, const sf_state *from, const double *step, double 
   for (i = 0; i < m->rows; ++i) to->lam[i] = from->lam[i] + share * step[m->unknowns + i];
   for (i = 0; i < m->angles; ++i) to->unwrapped[i] = sf_counted(m, i, to->q, to->unwrapped[i]);
   return 0;
+}
+
+/* Rotations at their prescribed values, by vectors. */
+static void sf_prescribe(const sf_model *m, int turning, const int *turned, const double *vector, sf_state *state) {
+  int i;
+  for (i = 0; i < turning; ++i, vector += 3)
+    if (m->space)
+      sf_turned(vector, state->q + (size_t)4 * turned[i]);
+    else
+      state->q[turned[i]] = vector[2];
 }

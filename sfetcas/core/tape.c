@@ -1,8 +1,8 @@
 /* Functions of terms as lists of operations, run for several terms at once.
  *
- * Each operation is a loop over lanes, which hold the numbers of terms beside each other: what choosing an operation
- * costs is shared by them, and compilers make vector instructions of the loops.  No lane knows of another, so that a
- * term has the same bits in any of them.
+ * Each operation is a loop over lanes, which hold the numbers of terms beside each other: compilers make vector
+ * instructions of these loops.  No lane knows of another, so that a term has the same bits in any of them.  Operations
+ * of one kind stand together as far as what they need allows: processors guess wrongly which kind comes next.
  */
 
 #include <math.h>
@@ -19,30 +19,133 @@ enum {
   SF_OPERATIONS
 };
 
+/* What is no single instruction, or seldom done. */
+static double sf_other(int operation, double x, double y) {
+  switch (operation) {
+    case SF_SIN: return sf_sin(x);
+    case SF_COS: return sf_cos(x);
+    case SF_TAN: return sf_tan(x);
+    case SF_ASIN: return sf_asin(x);
+    case SF_ACOS: return sf_acos(x);
+    case SF_ATAN: return sf_atan(x);
+    case SF_ATAN2: return sf_atan2(x, y);
+    case SF_EXP: return sf_exp(x);
+    case SF_LOG: return sf_log(x);
+    case SF_EXPM1: return sf_expm1(x);
+    case SF_LOG1P: return sf_log1p(x);
+    case SF_POW: return sf_pow(x, y);
+    case SF_SINH: return sf_sinh(x);
+    case SF_COSH: return sf_cosh(x);
+    case SF_TANH: return sf_tanh(x);
+    case SF_ASINH: return sf_asinh(x);
+    case SF_ACOSH: return sf_acosh(x);
+    case SF_ATANH: return sf_atanh(x);
+    case SF_ERF: return sf_erf(x);
+    case SF_HYPOT: return sf_hypot(x, y);
+    case SF_SIGN: return x < 0.0 ? -1.0 : x > 0.0 ? 1.0 : x;
+    case SF_COPYSIGN: return copysign(x, y);
+    case SF_FMIN: return x < y || y != y ? x : y;
+    case SF_FMAX: return x > y || y != y ? x : y;
+    case SF_FMOD: return fmod(x, y);
+    case SF_REMAINDER: return remainder(x, y);
+    case SF_FLOOR: return floor(x);
+    case SF_CEIL: return ceil(x);
+    case SF_LT: return x < y ? 1.0 : 0.0;
+    case SF_LE: return x <= y ? 1.0 : 0.0;
+    case SF_EQ: return x == y ? 1.0 : 0.0;
+    case SF_NE: return x != y ? 1.0 : 0.0;
+    case SF_NOT: return x == 0.0 ? 1.0 : 0.0;
+    case SF_AND: return x != 0.0 && y != 0.0 ? 1.0 : 0.0;
+    case SF_OR: return x != 0.0 || y != 0.0 ? 1.0 : 0.0;
+    case SF_IF: return x != 0.0 ? y : 0.0;
+    default: return NAN;
+  }
+}
+
 #define NAME sf_one
 #define LANES 1
+#define SF_WIDE
 #include "lanes.h"
 #undef NAME
 #undef LANES
-#define NAME sf_four
-#define LANES 4
-#include "lanes.h"
-#undef NAME
-#undef LANES
+#undef SF_WIDE
+/* Wider vector instructions where the processor has them: the same operations, and the same bits. */
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
+#define SF_WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define SF_WIDE
+#endif
 #define NAME sf_eight
 #define LANES 8
 #include "lanes.h"
 #undef NAME
 #undef LANES
 
-/* Lanes for what is left to do: the fewest that take it at once. */
-static int sf_lanes(int left) { return left >= 8 || left > 4 ? 8 : left > 1 ? 4 : 1; }
+#define SF_WINDOW 800 /* operations among which those of one kind are looked for; with more they take more slots */
+
+/* The operations of a tape, (operations, 4) numbers: kind, to, a, b, in an order in which those of a kind stand together.
+ *
+ * Of those that may come next, within a window, the most frequent kind is taken.  memory: 9 operations + slots + 1
+ * numbers; *needed: how many slots the order takes.  Returns the number of stretches.
+ */
+int sf_arrange(int operations, const int *code, sf_stretch *stretch, sf_operation *arranged, int *memory, int *needed) {
+  int n = operations, *a = memory, *b = a + n, *begin = b + n, *after = begin + n + 1, *waits = after + 2 * n;
+  int *uses = waits + n, *slot = uses + n, *unused = slot + n, *last = unused + n;
+  int i, k, first = 0, made = 0, frees = 0, total = 0;
+  for (i = 0; i <= n; ++i) begin[i] = 0;
+  for (i = 0; i < n; ++i) {
+    const int *one = code + 4 * (size_t)i;
+    /* What gave the numbers that it takes. */
+    a[i] = one[0] == SF_IN || one[0] == SF_CONSTANT ? -1 : last[one[2]];
+    b[i] = one[0] == SF_IN || one[0] == SF_CONSTANT || one[0] == SF_OUT ? -1 : last[one[3]];
+    if (one[0] != SF_OUT) last[one[1]] = i;
+    waits[i] = (a[i] >= 0) + (b[i] >= 0);
+    uses[i] = 0;
+    if (a[i] >= 0) ++begin[a[i] + 1];
+    if (b[i] >= 0) ++begin[b[i] + 1];
+  }
+  for (i = 0; i < n; ++i) begin[i + 1] += begin[i];
+  for (i = 0; i < n; ++i) {
+    if (a[i] >= 0) after[begin[a[i]] + uses[a[i]]++] = i;
+    if (b[i] >= 0) after[begin[b[i]] + uses[b[i]]++] = i;
+  }
+  *needed = 0;
+  while (total < n) {
+    int ready[SF_OPERATIONS] = {0}, kind = 0, end;
+    /* Done are those that wait for less than nothing. */
+    while (waits[first] < 0) ++first;
+    end = n - first < SF_WINDOW ? n : first + SF_WINDOW;
+    for (i = first; i < end; ++i)
+      if (waits[i] == 0) ++ready[code[4 * (size_t)i]];
+    for (k = 1; k < SF_OPERATIONS; ++k)
+      if (ready[k] > ready[kind]) kind = k;
+    stretch[made].operation = kind;
+    stretch[made].count = total;
+    for (i = first; i < end; ++i) {
+      const int *one = code + 4 * (size_t)i;
+      if (waits[i] || one[0] != kind) continue;
+      waits[i] = -1;
+      arranged[total].a = a[i] >= 0 ? slot[a[i]] : one[2];
+      arranged[total].b = b[i] >= 0 ? slot[b[i]] : 0;
+      if (a[i] >= 0 && !--uses[a[i]]) unused[frees++] = slot[a[i]];
+      if (b[i] >= 0 && !--uses[b[i]]) unused[frees++] = slot[b[i]];
+      slot[i] = one[1];
+      if (kind != SF_OUT) slot[i] = frees ? unused[--frees] : (*needed)++;
+      arranged[total++].to = slot[i];
+      for (k = begin[i]; k < begin[i + 1]; ++k) --waits[after[k]];
+    }
+    stretch[made].count = total - stretch[made].count;
+    ++made;
+  }
+  return made;
+}
+
+/* Lanes for what is left to do. */
+static int sf_lanes(int left) { return left > 1 ? 8 : 1; }
 
 static void sf_lanes_run(int lanes, const sf_tape *tape, const double *in, double *out, int left, double *w) {
   if (lanes == 8)
     sf_eight(tape, in, out, left, w);
-  else if (lanes == 4)
-    sf_four(tape, in, out, left, w);
   else
     sf_one(tape, in, out, left, w);
 }

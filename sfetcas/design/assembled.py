@@ -108,7 +108,7 @@ class Assembled:
     def _largest_load(self) -> float:
         """Unit of multipliers and of what is not in balance."""
         program = self.equations.program
-        lam = [program.state(flat).lam for flat in self.states]
+        lam = [program.equations.state(flat).lam for flat in self.states]
         return max(1.0, float(np.abs(np.stack(lam)).max(initial=0.0)))
 
     def _free_block(self, name: str, guess: Array) -> Unknown:

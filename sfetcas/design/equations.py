@@ -18,6 +18,7 @@ import numpy as np
 from ..description.scene import Scene
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
+from ..mechanics.inputs import Inputs
 from ..mechanics.mesh import Mesh, breaks_of
 from ..mechanics.model import assemble
 from ..parametric.arguments import Argument, Arguments, refuse_idle
@@ -207,7 +208,7 @@ class CaseEquations:
     @functools.cached_property
     def method(self) -> Globalised:
         """Globalised Newton method, for the first equilibria."""
-        return Globalised(self.program, Prepared(self.model).weight, Rules())
+        return self._method(Rules())
 
     @functools.cached_property
     def prepare(self) -> ca.Function:
@@ -225,10 +226,10 @@ class CaseEquations:
         start : state to start from; by default the undeformed one
         switch_branch : leave an unstable equilibrium for a stable one
         """
-        given = np.array(self.prepare(numbers)).ravel()
-        flat = None if start is None else self.program.flat(start)
+        row = np.array(self.program.row(self.prepare(numbers))).ravel()
+        flat = None if start is None else start.flat
         method = self.method if switch_branch else self._near
-        outcome = method(given, flat)
+        outcome = method(row, flat)
         if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
             return None, False
         return outcome.state, outcome.negative <= 0
@@ -246,7 +247,7 @@ class CaseEquations:
             apart = np.array(self.beside(w, np.concatenate([found, numbers[self.fixed]]))).ravel()
             if np.abs(apart).max() <= FITTED:
                 return found, places
-            places, start = places + apart, self.program.state(found)
+            places, start = places + apart, self.program.equations.state(found)
             low, high = self.room
             if not ((low < places) & (places < high)).all():
                 break
@@ -265,9 +266,13 @@ class CaseEquations:
             elif there == 1.0:
                 return found, fitted
             else:
-                share, start, places = there, self.program.state(found), fitted
+                share, start, places = there, self.program.equations.state(found), fitted
         return None, places
 
     @functools.cached_property
     def _near(self) -> Globalised:
-        return Globalised(self.program, Prepared(self.model).weight, Rules(escapes=0))
+        return self._method(Rules(escapes=0))
+
+    def _method(self, rules: Rules) -> Globalised:
+        prepared = Prepared(self.model)
+        return Globalised(Inputs(prepared.equations, self.program.varying), prepared.weight, rules)

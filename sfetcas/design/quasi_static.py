@@ -330,7 +330,10 @@ class QuasiStatic(Cases):
             led, _ = optimum.equations.led(begin, end, state, optimum.places[i - 1])
             if led is None:
                 return False
-            return here.prepared.distance(optimum.equations.program.state(led), here.state) < tolerances.SAME_STATE
+            return (
+                here.prepared.distance(optimum.equations.program.equations.state(led), here.state)
+                < tolerances.SAME_STATE
+            )
         names = [one.name for one in optimum.equations.arguments.arguments]
         for share in SHARES:
             numbers = (1.0 - share) * optimum.numbers[i - 1] + share * optimum.numbers[i]

@@ -213,7 +213,7 @@ class Solving:
             if i in pilots:
                 found, places = equations.fitted(every[i], self._start(i, values, pilots[i], equations), places)
             if found is None and states:
-                found, places = equations.led(every[-2], every[-1], program.state(states[-1]), ends[-1])
+                found, places = equations.led(every[-2], every[-1], program.equations.state(states[-1]), ends[-1])
             if found is None:
                 detail = labelled(case, "no equilibrium was found at the guess, accepted: a guess that has one")
                 raise SolveError(Status.FAILED, detail)
@@ -434,7 +434,7 @@ class Solving:
         equations, found = program.equations, []
         states, values, places = program.arrived(result.x), program.values(result.x), program.places(result.x)
         for i, case in enumerate(self.formulation.cases):
-            state, scene = equations.program.state(states[i]), self._scene(i, values)
+            state, scene = equations.program.equations.state(states[i]), self._scene(i, values)
             try:
                 found.append(certified(scene, equations, state, case, places[i], self.formulation.accuracy))
             except SolveError as error:
@@ -535,6 +535,5 @@ def _united(meshes: Sequence[Mesh]) -> Mesh:
 
 def _onto(coarse: CaseEquations, fine: CaseEquations, states: Array) -> Array:
     """States on another mesh."""
-    source, target = coarse.program, fine.program
-    moved = [transferred(coarse.model, source.state(flat), fine.model) for flat in states]
-    return np.stack([target.flat(state) for state in moved])
+    source = coarse.program.equations
+    return np.stack([transferred(coarse.model, source.state(flat), fine.model).flat for flat in states])

@@ -19,7 +19,7 @@ import numpy as np
 from ..core.building import SOURCES, compile_core, prefix, whole
 from .arrays import Array
 from .kernels import cache_folder, private
-from .tapes import NAMES, Tape
+from .tapes import KEPT, NAMES, Tape
 
 __all__ = [
     "Border",
@@ -27,6 +27,7 @@ __all__ = [
     "Counting",
     "Factors",
     "Group",
+    "Inputs",
     "Limits",
     "Map",
     "Model",
@@ -53,7 +54,8 @@ class TapeTable(ctypes.Structure):
     """``sf_tape``."""
 
     _fields_ = (
-        *((name, _int) for name in ("operations", "slots", "arguments", "results", "constants")),
+        *((name, _int) for name in ("stretches", "slots", "arguments", "results", "constants")),
+        ("stretch", _pointer),
         ("code", _pointer),
         ("constant", _pointer),
     )
@@ -236,32 +238,46 @@ class Cases(ctypes.Structure):
     )
 
 
+class Inputs(ctypes.Structure):
+    """``sf_inputs``."""
+
+    _fields_ = (
+        ("groups", _int),
+        *((name, _pointer) for name in ("count", "datum")),
+        ("turning", _int),
+        *((name, _pointer) for name in ("turned", "held")),
+        ("couples", _int),
+        *((name, _pointer) for name in ("couple", "rest", "begun", "reached")),
+    )
+
+
 class Rules(ctypes.Structure):
     """``sf_rules``."""
 
     _fields_ = (
-        *((name, _pointer) for name in ("mass", "sides", "seed", "convex", "slots")),
-        *((name, _int) for name in ("stiffness", "rounds", "halvings", "escapes", "sweeps")),
-        *((name, _int) for name in ("symmetric", "pivoted", "free", "sliding")),
+        *((name, _pointer) for name in ("mass", "sides", "seed", "convex")),
+        *((name, _int) for name in ("stiffness", "iterations", "corrections", "rounds", "halvings", "escapes")),
+        *((name, _int) for name in ("sweeps", "symmetric", "minimisable", "downhill", "pivoted", "sliding")),
         *((name, _double) for name in ("converged", "rounding", "gain", "turn", "near", "proximal", "soft", "hard")),
-        *((name, _double) for name in ("firm", "firmer", "left", "armijo", "noise", "nudge", "far", "level", "least")),
+        *((name, _double) for name in ("firm", "firmer", "left", "armijo", "noise", "nudge", "far", "shortest")),
+        *((name, _double) for name in ("level", "least")),
     )
 
 
 class Sought(ctypes.Structure):
     """``sf_sought``."""
 
-    _fields_ = (*((name, _int) for name in ("status", "negative", "left")), ("residual", _double))
+    _fields_ = (*((name, _int) for name in ("status", "negative", "iterations")), ("residual", _double))
 
 
-OF_WAYS = (Counting, Way, Cases, Rules, Sought)
+OF_WAYS = (Counting, Way, Cases, Rules, Sought, Inputs)
 
 HANDED = (TapeTable, Group, Model, Point, Factors, Pivoted, System, Limits, Border, Report, *OF_WAYS)
 
-SIZES = (16, *(ctypes.sizeof(kind) for kind in HANDED), len(NAMES))
+SIZES = (12, *(ctypes.sizeof(kind) for kind in HANDED), 8, len(NAMES))
 """What the core says of the sizes of what is handed to it, if it is the one that this module was written for."""
 
-VERSION = 3
+VERSION = 4
 """Number of the interface, as ``SF_VERSION``."""
 
 
@@ -275,11 +291,29 @@ def doubles(values: Array) -> Array:
     return np.ascontiguousarray(values, dtype=float)
 
 
+@functools.lru_cache(maxsize=KEPT)
 def table_of(tape: Tape) -> tuple[TapeTable, list[Array]]:
-    """A tape as the core takes it, and the arrays that it points to."""
-    code, constant = integers(tape.code), doubles(tape.constant)
-    sizes = (len(code), tape.slots, tape.arguments, tape.results, len(constant))
-    return TapeTable(*sizes, code.ctypes.data, constant.ctypes.data), [code, constant]
+    """A tape as the core takes it, and the arrays that it points to.
+
+    Where there is a core operations of a kind stand together, which it does faster.
+    """
+    library, code, constant = core(), integers(tape.code), doubles(tape.constant)
+    stretch, arranged, slots = _stretches(code), integers(code[:, 1:]), tape.slots
+    if library is not None:
+        memory, needed = np.empty(9 * len(code) + slots + 1, np.intc), _int()
+        most, arranged = np.empty((len(code), 2), np.intc), np.empty_like(arranged)
+        places = (array.ctypes.data for array in (code, most, arranged, memory))
+        count = library.sf_arrange(len(code), *places, ctypes.addressof(needed))
+        stretch, slots = most[:count].copy(), needed.value
+    sizes = (len(stretch), slots, tape.arguments, tape.results, len(constant))
+    arrays = [stretch, arranged, constant]
+    return TapeTable(*sizes, *(array.ctypes.data for array in arrays)), arrays
+
+
+def _stretches(code: Array) -> Array:
+    """Kinds of operations as they follow each other, and how many of each, (stretches, 2)."""
+    first = np.flatnonzero(np.diff(code[:, 0], prepend=-1))
+    return integers(np.stack([code[first, 0], np.diff(first, append=len(code))], axis=1))
 
 
 def core() -> ctypes.CDLL | None:
@@ -319,6 +353,7 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL | None:
     library.sf_sizes(sizes)
     if library.sf_version() != VERSION or tuple(sizes) != SIZES:
         return None
+    library.sf_arrange.argtypes = [_int, *[_pointer] * 5]
     library.sf_run.argtypes = [_pointer, _int, _pointer, _pointer, _pointer]
     library.sf_tape_work.argtypes = [_pointer]
     library.sf_work_size.argtypes = [_pointer]
@@ -335,7 +370,7 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL | None:
     library.sf_negative.argtypes = [_pointer] * 5
     library.sf_follow.argtypes = [_pointer] * 10
     library.sf_solve_cases.argtypes = [_pointer] * 9
-    library.sf_seek_size.argtypes = [_pointer] * 2
-    library.sf_seek.argtypes = [*[_pointer] * 4, _int, _int, *[_pointer] * 4]
+    library.sf_find_size.argtypes = [_pointer] * 3
+    library.sf_find.argtypes = [*[_pointer] * 5, _int, *[_pointer] * 4]
     library.sf_solve.argtypes = [_pointer, _pointer, _int, _pointer, _pointer, _pointer]
     return library

@@ -30,7 +30,10 @@ __all__ = [
     "SparseMap",
     "SparseSolver",
     "blurred",
+    "factor_tables",
+    "last_rows",
     "pattern",
+    "pivot_order",
     "places_of",
     "smallest",
 ]
@@ -198,7 +201,7 @@ class SparseSolver:
     @functools.cached_property
     def _system(self) -> CoreSystem:
         assert self._core is not None
-        last = self._rows if self._few else 0
+        last = last_rows(self._rows)
         return CoreSystem(
             self._core,
             self.n,
@@ -441,10 +444,7 @@ class CoreFactors:
 
     def __init__(self, library: ctypes.CDLL, n: int, row: Array, column: Array) -> None:
         self._library = library
-        order = _sparse_order(n, row, column).astype(np.intc)
-        place = np.argsort(order).astype(np.intc)
-        start = np.searchsorted(column, np.arange(n + 1)).astype(np.intc)
-        self.tables = tables = [start, np.ascontiguousarray(row, dtype=np.intc), order, place]
+        self.tables = tables = factor_tables(n, row, column)
         # One piece of memory of each kind: of many small ones each would take as long.
         self._memory = whole, numbers = np.zeros(5 * n + 1, np.intc), np.zeros(2 * n)
         parent, mark, path, used, lower = _parts_of(whole, n, 5)
@@ -502,7 +502,7 @@ class CoreSystem:
     ) -> None:
         self._library, self._n, self._soft = library, n, doubles(soft)
         self._factors = CoreFactors(library, n, row, column)
-        order = _sparse_order(n, row, column, last).astype(np.intc)
+        order = pivot_order(n, row, column, last)
         self._whole, self._numbers = np.zeros(8 * n + 2, np.intc), np.zeros(6 * n)
         self._order, self._room = order, 0
         start, rows = self._factors.tables[:2]
@@ -547,6 +547,23 @@ class CoreSystem:
             if broken:
                 raise np.linalg.LinAlgError("singular matrix")
             return x.T
+
+
+def factor_tables(n: int, row: Array, column: Array) -> list[Array]:
+    """What factors without pivoting take: see :attr:`CoreFactors.tables`."""
+    order = _sparse_order(n, row, column).astype(np.intc)
+    start = np.searchsorted(column, np.arange(n + 1)).astype(np.intc)
+    return [start, np.ascontiguousarray(row, dtype=np.intc), order, np.argsort(order).astype(np.intc)]
+
+
+def pivot_order(n: int, row: Array, column: Array, last: int) -> Array:
+    """The order (n,) in which unknowns are eliminated where there is pivoting, with the last of them at the end."""
+    return _sparse_order(n, row, column, last).astype(np.intc)
+
+
+def last_rows(rows: int) -> int:
+    """How many of the multipliers are eliminated last: few of them."""
+    return rows if rows <= FEW_ROWS else 0
 
 
 def _parts_of(array: Array, size: int, count: int) -> list[int]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
 from .arrays import Array
 
-__all__ = ["NAMES", "Tape", "tape_of"]
+__all__ = ["KEPT", "NAMES", "Tape", "tape_of"]
 
 # fmt: off
 NAMES = [
@@ -36,7 +36,8 @@ KEPT = 256
 """Functions whose tapes are kept at hand: those of the kinds of terms of some models."""
 
 
-class Tape(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Tape:
     """A function of SX as a list of operations.
 
     Attributes

@@ -12,16 +12,15 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from .. import tolerances
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array, Index
-from ..mathematics.core import Border, Counting, Limits, Report, Rules, Sought, Way, doubles
+from ..mathematics.core import Border, Counting, Limits, Report, Way, doubles
 from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import CoreSystem, SparseSolver
 from .batches import GroupBatch, at_rest
@@ -70,6 +69,11 @@ class State:
     y: Array
     lam: Array
     unwrapped: Array
+
+    @property
+    def flat(self) -> Array:
+        """All of it as one vector (states,), see :meth:`Equations.state`."""
+        return np.concatenate([self.q.ravel(), self.y, self.lam, self.unwrapped])
 
 
 @dataclass(frozen=True)
@@ -155,13 +159,21 @@ class Equations:
 
     def remembering(self, model: Model) -> Equations:
         """The same equations of a model that differs by what its members remember alone."""
+        return self._with(model, [i for i, group in enumerate(model.terms) if group.kind.memory])
+
+    def with_data(self, data: Mapping[int, Array]) -> Equations:
+        """The same equations with other data (n, width) of groups of terms, by their numbers."""
+        return self._with(self.model.with_data(data), data)
+
+    def _with(self, model: Model, changed: Collection[int]) -> Equations:
+        """The same equations of a model that differs by the data of groups of terms."""
         found = copy.copy(self)
+        found.__dict__.pop("_convex", None)
         found.model, found.tables, found._given = model, self.layout.tables_of(model), []
         found._core = None if self._core is None else self._core.of(model)
-        pairs = enumerate(zip(self._terms, model.terms, strict=True))
         found._terms = [
-            _Terms(self.layout, model, i, "interpreted", 1.0) if group.kind.memory else terms
-            for i, (terms, group) in pairs
+            _Terms(self.layout, model, i, "interpreted", 1.0) if i in changed else terms
+            for i, terms in enumerate(self._terms)
         ]
         return found
 
@@ -240,13 +252,20 @@ class Equations:
 
     # -- evaluation -----------------------------------------------------------------------------
 
+    def state(self, flat: Array) -> State:
+        """The state of a vector (states,): rotations, displacements, multipliers, values near which angles count."""
+        count, components = len(self.model.rotations.kind), self.model.element.components
+        sizes = [count * components, self.displacement_unknowns, self.rows]
+        q, y, lam, unwrapped = np.split(flat, np.cumsum(sizes))
+        return State(q.reshape(count, components), y, lam, unwrapped)
+
     def start(self, loading: Loading) -> State:
         """The undeformed state, with prescribed rotations at their values."""
         unwrapping = self.model.unwrapping
         unwrapped = unwrapping.prescribed(self.model.rotations.kind, loading)
         unwrapped = np.where(np.isnan(unwrapped), unwrapping.of_vectors(loading.turn), unwrapped)
         return State(
-            self.model.prescribed_rotations(loading),
+            self.model.prescribed_rotations(loading.turn),
             np.zeros(self.displacement_unknowns),
             np.zeros(self.rows),
             unwrapped,
@@ -256,7 +275,7 @@ class Equations:
         """The state with prescribed rotations set to their values."""
         q = np.where(
             (self.model.rotations.kind == RotationFreedom.FIXED)[:, None],
-            self.model.prescribed_rotations(loading),
+            self.model.prescribed_rotations(loading.turn),
             state.q,
         )
         if not self.model.unwrapping.count:
@@ -323,10 +342,6 @@ class Equations:
             (self.model.positions.E.T @ loading.force.ravel()).reshape(len(self._first), self.model.element.axes)
         )
 
-    def _loaded_pulls(self, loading: Loading) -> Array:
-        """Minus the internal forces (elements, points, axes) that loads cause."""
-        return np.asarray(loading.pull - self._hanging_pulls(loading)[self._owner][:, None, :])
-
     def displacements(self, state: State, loading: Loading, gained: Array) -> tuple[Array, Array]:
         """Displacements of the places (places * axes,) and gaps of the loop closures (closings,), dimensionless.
 
@@ -334,37 +349,40 @@ class Equations:
         """
         positions, delta = self.model.positions, self._chords(gained)
         nodal = positions.E @ delta + positions.Y @ state.y + positions.B @ loading.shift
-        return nodal, self._gaps(delta, state, loading)
+        return nodal, positions.Z @ delta + positions.W @ state.y + positions.BZ @ loading.shift
 
     def _chords(self, gained: Array) -> Array:
         """Changes of the chords of the segments, (segments * axes,)."""
         return np.add.reduceat(gained, self._first, axis=0).ravel() if len(gained) else np.zeros(0)
 
-    def _gaps(self, delta: Array, state: State, loading: Loading) -> Array:
-        positions = self.model.positions
-        if not len(positions.rows):
-            return np.zeros(0)
-        return np.asarray(positions.Z @ delta + positions.W @ state.y + positions.BZ @ loading.shift)
-
     def retained_places(self, state: State, loading: Loading) -> Array:
         """Displacements (places, axes), dimensionless, of retained places, unknown or prescribed; else undefined."""
-        positions = self.model.positions
-        moved = positions.Y @ state.y + positions.B @ loading.shift
+        return self._retained(state, self.given(loading))
+
+    def _retained(self, state: State, given: Array) -> Array:
+        moved = self.model.positions.Y @ state.y + given[self.layout.given["shift"]]
         return np.asarray(moved.reshape(len(self.model.segments.places), self.model.element.axes))
 
-    def _evaluated(self, state: State, loading: Loading) -> _Results:
+    def _pulls(self, given: Array) -> Array:
+        """Minus the internal forces (elements, points, axes) that loads cause."""
+        return given[self.layout.given["pull"]].reshape(*self.model.beams.weight.shape, self.model.element.axes)
+
+    def _evaluated(self, state: State, given: Array) -> _Results:
         """Results of the terms of all groups at a state; to be read before they are evaluated again."""
         if self._core is not None:
-            parts = self._core.evaluate(_arrays(state), self.given(loading))
-            return _Results(parts, self._core.places, self._core.pull)
-        places = self.retained_places(state, loading)
-        pull = self._loaded_pulls(loading)
+            return _Results(self._core.evaluate(_arrays(state), given), self._core.places, self._core.pull)
+        places, pull = self._retained(state, given), self._pulls(given)
         constant = self._closing_pulls(state.lam)[self._owner]
         found = [
-            group(state, places, pull if number == 0 else loading.loads[number - 1], constant)
+            group(state, places, pull if number == 0 else self._loads(number - 1, given), constant)
             for number, group in enumerate(self._terms)
         ]
         return _Results(found, places, pull + constant[:, None, :])
+
+    def _loads(self, number: int, given: Array) -> Array:
+        """Loads (n, width) of a group of connections."""
+        group = self.model.connections[number]
+        return given[self.layout.given[f"loads {number}"]].reshape(len(group.data), group.kind.sizes[4])
 
     def at(self, state: State, loading: Loading, *, convex: bool = False) -> Point:
         """Evaluate the equations at a state.
@@ -372,28 +390,28 @@ class Equations:
         With ``convex`` the stiffness matrices of terms without constraint rows are replaced by positive semidefinite
         ones.
         """
+        return self.under(state, self.given(loading), convex=convex)
+
+    def under(self, state: State, given: Array, *, convex: bool = False) -> Point:
+        """As :meth:`at`, under loads and motions in a row, of :meth:`given`."""
         if self._core is not None:
-            return self._at_by_core(state, loading, convex=convex)
-        positions, rotation_unknowns = self.model.positions, self.rotation_unknowns
-        results = self._evaluated(state, loading)
-        found, force, nodal = results.groups, loading.force.ravel(), results.places.ravel()
+            return self._point_of(self._core.at(_arrays(state), given), convex=convex)
+        positions, rotation_unknowns, part_of = self.model.positions, self.rotation_unknowns, self.layout.given
+        results = self._evaluated(state, given)
+        found, force, nodal = results.groups, given[part_of["force"]], results.places.ravel()
         potential = sum(float(part[0].sum()) for part in found) - float(force @ nodal)
         stored = sum(float(part[1].sum()) for part in found)
-        residual = self._gathered([part[3] for part in found])
+        residual = self._gathered([part[3] for part in found]) + given[part_of["beside"]]
         scale = self._gathered_sizes([part[3] for part in found], results.pull) + self.noise
-        if loading.further.any():
-            residual -= self._of_moments(loading.further)
-        if loading.torque.any():
-            residual -= self._of_torque(loading.torque)
         lam = state.lam[: len(positions.rows)]
         if self.displacement_unknowns:
             displacement = slice(rotation_unknowns, self.unknowns)
-            residual[displacement] += positions.W.T @ lam - positions.Y.T @ force
+            residual[displacement] += positions.W.T @ lam
             sums = positions.W.T.absolute @ np.abs(lam) + positions.Y.T.absolute @ np.abs(force)
             # A node at which next to nothing acts is judged by a millionth of what acts elsewhere.
             scale[displacement] += sums + UNLOADED * sums.max(initial=0.0) + 1e-12
         if self.rows:
-            gap = self._gaps(self._chords(found[0][2]), state, loading)
+            gap = positions.Z @ self._chords(found[0][2]) + positions.W @ state.y + given[part_of["opening"]]
             residual[self.unknowns : self.unknowns + len(gap)] = gap
             for group, part in zip(self._terms[1:], found[1:], strict=True):
                 # Several terms may share a row.
@@ -412,10 +430,6 @@ class Equations:
         """Entries of the matrix from the results of all terms."""
         pairs = zip(self._terms, parts, strict=True)
         return self._matrix([group.entries(part, convex=convex) for group, part in pairs])
-
-    def _at_by_core(self, state: State, loading: Loading, *, convex: bool) -> Point:
-        assert self._core is not None
-        return self._point_of(self._core.at(_arrays(state), self.given(loading)), convex=convex)
 
     def _point_of(self, found: CorePoint, *, convex: bool = False) -> Point:
         """What the core has evaluated last."""
@@ -476,23 +490,14 @@ class Equations:
         there, reached = core.follow(system, _arrays(state), doubles(tangent), way, limits, counting)
         return State(*there), reached
 
-    def sought(
-        self, state: State, loading: Loading, rules: Rules, whole: int, left: int
-    ) -> tuple[State, Sought] | None:
-        """The globalised Newton method by the core: the last state, and how it ended; None without a core.
+    def for_search(self, varying: Sequence[int]) -> tuple[CoreModel, CoreSystem] | None:
+        """The core's model and its system for the globalised Newton method, with data of their own where these vary.
 
-        Arguments are those of :meth:`.CoreModel.seek`; the tape of ``rules`` is set by :meth:`positive_matrices`.
+        None without a core.
         """
-        if self._with_system is None:
+        if self._core is None or not self._core.searchable:
             return None
-        core, system = self._with_system
-        there, sought = core.seek(system, _arrays(state), self.given(loading), rules, whole, left)
-        return State(*there), sought
-
-    @functools.cached_property
-    def positive_matrices(self) -> tuple[int, Array, int, list[Any]] | None:
-        """What the core needs for positive matrices of elements, see :meth:`.CoreModel.convex_of`."""
-        return None if self._core is None else self._core.convex_of(self.model)
+        return self.apart() if varying else self._with_system
 
     def clearly_negative(self, entries: Array, counting: Counting) -> int | None:
         """Number of negative eigenvalues by the core; None without one, where one is near zero, or nobody knows."""
@@ -520,7 +525,7 @@ class Equations:
             beside -= self._of_torque(loading.torque)
         if self.displacement_unknowns:
             beside[self.rotation_unknowns : self.unknowns] -= positions.Y.T @ force
-        pull = self._loaded_pulls(loading)
+        pull = loading.pull - self._hanging_pulls(loading)[self._owner][:, None, :]
         shift = loading.shift
         shifts = (positions.B @ shift, positions.BZ @ shift) if shift.any() else (shift, np.zeros(len(positions.rows)))
         parts = [pull, *loading.loads, *shifts, beside]
@@ -550,13 +555,15 @@ class Equations:
         sizes[: gradients[0].size].reshape(gradients[0].shape)[...] += carried[:, None]
         return self._added(sizes[self.layout.used] * self.layout.absolute_share)
 
-    def convex_entries(self, state: State, loading: Loading) -> Array:
-        """Entries of the Newton matrix with the positive matrices of elements of :attr:`.Element.convex`."""
-        parts = [[*part] for part in self._evaluated(state, loading).groups]
+    def convex_entries(self, state: State, given: Array) -> Array:
+        """Entries of the Newton matrix with the positive matrices of elements of :attr:`.Element.convex`.
+
+        ``given`` are loads and motions in a row, of :meth:`given`.
+        """
+        parts = [[*part] for part in self._evaluated(state, given).groups]
         if len(parts[0][4]):
-            pull = self._loaded_pulls(loading)
             constant = self._closing_pulls(state.lam)[self._owner]
-            places = self.retained_places(state, loading)
+            places, pull = self._retained(state, given), self._pulls(given)
             parts[0][4] = self._convex(state.q, places, state.unwrapped, pull, constant)[0]
         return self._of_parts(parts, convex=False)
 
@@ -568,18 +575,18 @@ class Equations:
         """Derivative of the residual, (unknowns + rows,), along a rate of nodal loads and prescribed displacements."""
         if self._core is not None:
             return self._core.slope(_arrays(state), self.given(rate))
-        positions = self.model.positions
-        hanging = -self._hanging_pulls(rate)[self._owner]
-        parts = [np.einsum("eca,ea->ec", point.rotation_jacobian, hanging)]
-        places = self.retained_places(state, rate)
-        for group, load in zip(self._terms[1:], rate.loads, strict=True):
+        given, part_of = self.given(rate), self.layout.given
+        # Forces at places pull at all segments that lead there.
+        parts = [np.einsum("eca,ea->ec", point.rotation_jacobian, self._pulls(given)[:, 0])]
+        places = self._retained(state, given)
+        for number, group in enumerate(self._terms[1:]):
             # What loads do is linear in them.
             linear = group.kind.proportional
+            load = self._loads(number, given)
             found = group(state, places, load, np.zeros(0))[3] if linear else np.zeros(group.sides.shape)
             parts.append(found.copy())
-        slope = self._gathered(parts)
-        slope[self.rotation_unknowns : self.unknowns] -= positions.Y.T @ rate.force.ravel()
-        slope[self.unknowns : self.unknowns + len(positions.rows)] += positions.BZ @ rate.shift
+        slope = self._gathered(parts) + given[part_of["beside"]]
+        slope[self.unknowns : self.unknowns + len(self.model.positions.rows)] += given[part_of["opening"]]
         return slope
 
     def places(self, state: State, loading: Loading) -> Array:
@@ -594,7 +601,7 @@ class Equations:
         the couples along them, too.
         """
         acting = self.acting(state, loading)
-        found = self._evaluated(state, acting).groups
+        found = self._evaluated(state, self.given(acting)).groups
         pairs = zip(found, self.model.terms, strict=True)
         shares = [np.zeros_like(part[3]) if group.kind.is_load else part[3].copy() for part, group in pairs]
         width = int(np.prod(acting.torque.shape[1:]))
@@ -609,7 +616,7 @@ class Equations:
     def node_jacobian(self, state: State, loading: Loading, chosen: Index) -> tuple[Array, Array]:
         """Chosen displacement components of nodes (chosen,) and their derivatives (chosen, unknowns), dimensionless."""
         positions, tables = self.model.positions, self.tables
-        found = self._evaluated(state, loading).groups[0]
+        found = self._evaluated(state, self.given(loading)).groups[0]
         sides = tables.sides[0]
         rotation_jacobian = found[5].reshape(*sides.shape, self.model.element.axes)
         maps = (
@@ -641,7 +648,7 @@ class Equations:
     def elastic_entries(self) -> Array:
         """Entries of the Newton matrix for the strain energy of the elements alone in the undeformed state."""
         rest, nothing = self._at_rest()
-        pairs = zip(self._terms, self._evaluated(rest, nothing).groups, strict=True)
+        pairs = zip(self._terms, self._evaluated(rest, self.given(nothing)).groups, strict=True)
         return self._matrix([group.entries([*part[:5], 0.0 * part[5]]) for group, part in pairs], ties=0.0)
 
     def effective(self, state: State, loading: Loading) -> Loading:

@@ -10,7 +10,8 @@ from __future__ import annotations
 import copy
 import ctypes
 import functools
-from collections.abc import Iterator, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from .layout import Layout
 from .model import Model
 from .terms import rotation_gradient
 
-__all__ = ["UNLOADED", "CoreModel", "CorePoint", "Parts", "core_model"]
+__all__ = ["UNLOADED", "CoreModel", "CorePoint", "Handed", "Parts", "core_model", "handed"]
 
 UNLOADED = 1e-6
 """Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
@@ -38,12 +39,16 @@ def core_model(layout: Layout, model: Model, noise: Array) -> CoreModel | None:
     ``noise`` (total,) is what rounding leaves of each residual; it may be set later on.
     """
     library = c.core()
-    if library is None:
-        return None
+    found = None if library is None else handed(layout, model, noise)
+    return None if library is None or found is None else CoreModel(library, found)
+
+
+def handed(layout: Layout, model: Model, noise: Array) -> Handed | None:
+    """The model as the core takes it; None where a kind of term has operations that it does not know."""
     if layout.of_core is None:
-        layout.of_core = _CoreLayout(layout, model)
-    found = layout.of_core
-    return CoreModel(library, found, model, noise) if isinstance(found, _CoreLayout) and found.known else None
+        layout.of_core = CoreLayout(layout, model)
+    found: CoreLayout = layout.of_core
+    return Handed(found, model, noise) if found.known else None
 
 
 class CorePoint:
@@ -84,7 +89,7 @@ class CorePoint:
         return ctypes.addressof(self._point)
 
 
-class _CoreLayout:
+class CoreLayout:
     """What the core takes that follows from the structure of a model alone, see :class:`~.layout.Layout`.
 
     Attributes
@@ -96,6 +101,9 @@ class _CoreLayout:
     groups : array of Group
         The groups for the core, without their data.
     tapes : list of Tape
+        Of the groups; ``tables`` are the same as the core takes them.
+    arrays : dict
+        What the structures point to, by addresses.
     begins : ndarray (groups + 1,)
         Where the results of each group begin.
     """
@@ -104,13 +112,25 @@ class _CoreLayout:
         self._layout, self._tables = layout, layout.tables
         tapes = [tape_of(rotation_gradient(group.kind)) for group in model.terms]
         self.tapes = [tape for tape in tapes if tape is not None]
-        self.known = len(self.tapes) == len(tapes)
-        self._alive: list[Any] = []
+        self.known, self._element = len(self.tapes) == len(tapes), model.element if len(model.terms[0].data) else None
+        self.arrays: dict[int, Any] = {}
+        self.tables = list[c.TapeTable]()
         if self.known:
             self._terms = [len(group.data) for group in model.terms]
             sizes = (n * tape.results for n, tape in zip(self._terms, self.tapes, strict=True))
             self.begins = np.cumsum([0, *sizes])
             self._make(model)
+
+    @functools.cached_property
+    def convex(self) -> tuple[c.TapeTable, list[Array]] | None:
+        """The tape of the positive matrices of elements; None where there are none, or it cannot be one."""
+        tape = None if self._element is None else tape_of(self._element.convex)
+        return None if tape is None else c.table_of(tape)
+
+    @property
+    def searchable(self) -> bool:
+        """Whether the globalised Newton method can be run by the core."""
+        return self._element is None or self.convex is not None
 
     def _make(self, model: Model) -> None:
         layout, tables, maps, element = self._layout, self._tables, model.positions, model.element
@@ -118,7 +138,8 @@ class _CoreLayout:
         slides = [np.concatenate([unknown[:, None], rows], axis=1) for unknown, rows in layout.sliding]
         of_rotations = slice(0, tables.of_places)
         sides, side_of = self._sides()
-        begins = self._given(model, places * element.axes, along[0] * along[1] * element.axes)
+        given = layout.given
+        begins = {"given": given["force"].stop, **{name: part.start for name, part in given.items()}}
         self.groups = (c.Group * len(model.terms))(*self._groups(model, begins))
         angles = model.unwrapping.count
         self.model = c.Model(
@@ -153,8 +174,10 @@ class _CoreLayout:
 
     def _kept(self, array: Array) -> int:
         """Address of an array that lives as long as this."""
-        self._alive.append(array)
-        return int(array.ctypes.data)
+        # Of those that begin at one place the longest has all that the others have.
+        known = self.arrays.get(address := int(array.ctypes.data))
+        self.arrays[address] = array if known is None or known.size < array.size else known
+        return address
 
     def _map(self, matrix: SparseMap) -> c.Map:
         start = np.searchsorted(matrix.row, np.arange(matrix.shape[0] + 1))
@@ -168,24 +191,11 @@ class _CoreLayout:
         parts = (c.integers(start), c.integers(source[order]), c.doubles(weight[order]))
         return c.Sums(count, *(self._kept(part) for part in parts))
 
-    def _given(self, model: Model, on_places: int, pulls: int) -> dict[str, int]:
-        """Where the parts of what is given begin, see ``sf_model``."""
-        loads = [len(group.data) * group.kind.sizes[4] for group in model.connections]
-        sizes = {
-            "pull": pulls,
-            **{f"loads {i}": size for i, size in enumerate(loads)},
-            "shift": on_places,
-            "opening": len(model.positions.rows),
-            "beside": self._tables.total,
-            "force": on_places,
-        }
-        ends = np.cumsum(list(sizes.values())).tolist()
-        return {"given": ends[-1], **{name: end - size for (name, size), end in zip(sizes.items(), ends, strict=True)}}
-
     def _groups(self, model: Model, begins: dict[str, int]) -> Iterator[c.Group]:
         for i, (group, tape) in enumerate(zip(model.terms, self.tapes, strict=True)):
             table, arrays = c.table_of(tape)
-            self._alive += [table, *arrays]
+            self.tables.append(table)
+            self.arrays |= {ctypes.addressof(table): table, **{array.ctypes.data: array for array in arrays}}
             part = model.unwrapping.parts[i]
             turns, places, rows, data, loads = group.kind.sizes
             yield c.Group(
@@ -235,6 +245,63 @@ class _CoreLayout:
         return sums, self._kept(c.integers(element[layout.used][order]))
 
 
+class Handed:
+    """One model as the core takes it.
+
+    Parameters
+    ----------
+    layout : CoreLayout
+    model : Model
+    noise : ndarray (total,)
+        What rounding leaves of each residual.
+
+    Attributes
+    ----------
+    structure : Model
+    groups : array of Group
+    data : list of ndarray (terms, data)
+        Of each group.
+    arrays : dict
+        What these point to, by addresses.
+    """
+
+    def __init__(self, layout: CoreLayout, model: Model, noise: Array) -> None:
+        self.layout, angles = layout, model.unwrapping
+        numbers, sides = np.zeros((angles.count, 8)), np.zeros((angles.count, 3))
+        if angles.count:
+            crossed = np.asarray(angles.across.any(axis=1))
+            numbers[:, :3], numbers[:, 3:6], numbers[:, 6] = angles.axis, angles.across, np.where(crossed, 1.0, 2.0)
+            sides = np.concatenate([angles.sides, crossed[:, None]], axis=1)
+        self._own = [c.doubles(model.beams.weight), noise, numbers, c.integers(sides)]
+        self._take(model)
+
+    def _take(self, model: Model) -> None:
+        self.structure = structure = c.Model.from_buffer_copy(self.layout.model)
+        own = (part.ctypes.data for part in self._own)
+        structure.weight, structure.noise, structure.counted, structure.counting = own
+        self.groups = type(self.layout.groups).from_buffer_copy(self.layout.groups)
+        self.data = [c.doubles(group.data) for group in model.terms]
+        for group, data in zip(self.groups, self.data, strict=True):
+            group.datum = data.ctypes.data
+        structure.group = ctypes.addressof(self.groups)
+
+    def of(self, model: Model) -> Handed:
+        """The same of a model that differs by the data of terms alone."""
+        found = copy.copy(self)
+        found._take(model)
+        return found
+
+    @property
+    def arrays(self) -> dict[int, Any]:
+        """What the structures point to, by addresses."""
+        return self.layout.arrays | {part.ctypes.data: part for part in (*self._own, *self.data)}
+
+    @property
+    def along(self) -> tuple[int, int, int]:
+        """Elements, points of each, and axes."""
+        return self.structure.elements, self.structure.points, self.structure.axes
+
+
 class CoreModel:
     """One model for the core, the memory that evaluating takes, and calls.
 
@@ -242,10 +309,7 @@ class CoreModel:
     ----------
     library : CDLL
         The core.
-    layout : _CoreLayout
-    model : Model
-    noise : ndarray (total,)
-        What rounding leaves of each residual.
+    handed : Handed
 
     Attributes
     ----------
@@ -257,44 +321,19 @@ class CoreModel:
         Where the core finds the memory that all points share.
     """
 
-    def __init__(self, library: ctypes.CDLL, layout: _CoreLayout, model: Model, noise: Array) -> None:
-        self._library, self._layout, self._noise = library, layout, noise
-        self.total, self.entry_count = layout.model.total, layout.model.entry_count
-        self._model = c.Model.from_buffer_copy(layout.model)
-        self._weight = c.doubles(model.beams.weight)
-        self._model.weight, self._model.noise = self._weight.ctypes.data, noise.ctypes.data
-        angles = model.unwrapping
-        if angles.count:
-            crossed = np.asarray(angles.across.any(axis=1))
-            numbers = np.zeros((angles.count, 8))
-            numbers[:, :3], numbers[:, 3:6], numbers[:, 6] = angles.axis, angles.across, np.where(crossed, 1.0, 2.0)
-            self._angles = (numbers, c.integers(np.concatenate([angles.sides, crossed[:, None]], axis=1)))
-            self._model.counted, self._model.counting = (part.ctypes.data for part in self._angles)
-        self._take(model)
-
-    def _take(self, model: Model) -> None:
-        """Take the data of the terms, and make the memory that evaluating takes."""
-        layout = self._layout
-        self._groups = type(layout.groups).from_buffer_copy(layout.groups)
-        self._data = [c.doubles(group.data) for group in model.terms]
-        for group, data in zip(self._groups, self._data, strict=True):
-            group.datum = data.ctypes.data
-        self._model.group = ctypes.addressof(self._groups)
-        self._address = ctypes.addressof(self._model)
-        self._results, self.pull = np.zeros(layout.model.results), np.zeros((*self._weight.shape, model.element.axes))
-        self.places = np.zeros((layout.model.places, model.element.axes))
-        self._work = np.zeros(max(1, self._library.sf_work_size(self._address)))
+    def __init__(self, library: ctypes.CDLL, handed: Handed) -> None:
+        self._library, self._handed, self._layout = library, handed, handed.layout
+        self.total, self.entry_count = handed.structure.total, handed.structure.entry_count
+        self._address = ctypes.addressof(handed.structure)
+        self._results, self.pull = np.zeros(handed.structure.results), np.zeros(handed.along)
+        self.places = np.zeros((handed.structure.places, handed.structure.axes))
+        self._work = np.zeros(max(1, library.sf_work_size(self._address)))
         self.shared = tuple(part.ctypes.data for part in (self._results, self.places, self.pull, self._work))
         self._scratch = CorePoint(self)
 
     def of(self, model: Model) -> CoreModel:
         """The same of a model that differs by the data of terms alone, with memory of its own."""
-        found = copy.copy(self)
-        for made in ("_correcting", "_following", "_sloping"):
-            found.__dict__.pop(made, None)
-        found._model = c.Model.from_buffer_copy(self._model)
-        found._take(model)
-        return found
+        return CoreModel(self._library, self._handed.of(model))
 
     # -- calls ----------------------------------------------------------------------------------------
 
@@ -436,44 +475,52 @@ class CoreModel:
             system.make_room()
             ctypes.pointer(way)[0] = begun
 
-    def seek(
-        self,
-        system: CoreSystem,
-        state: tuple[Array, Array, Array, Array],
-        given: Array,
-        rules: c.Rules,
-        whole: int,
-        left: int,
-    ) -> tuple[tuple[Array, Array, Array, Array], c.Sought]:
-        """The globalised Newton method from a state (q, y, lam, unwrapped): the last one, and how it ended.
+    def search(
+        self, system: CoreSystem, rules: c.Rules, inputs: c.Inputs, varying: Sequence[int]
+    ) -> Callable[[Array, Array, int], c.Sought | None]:
+        """The globalised Newton method, ready to be called with a row, a state that it changes, and how it begins.
 
-        Parameters
-        ----------
-        whole : int
-            Whole steps at most, from a near state; 0 for the way downhill.
-        left : int
-            Iterations at most.
+        What is returned is None where the seed of ``rules`` is missing, see ``sf_find``.  The data of groups that vary
+        are overwritten, so that this model is no other's.
         """
-        (handed, there), sought, of_rules = self._changed(state), c.Sought(), ctypes.addressof(rules)
-        memory = np.empty(self._library.sf_seek_size(self._address, of_rules))
-        addresses = (system.address, of_rules, given.ctypes.data, whole, left, ctypes.addressof(handed))
-        rest = (self._scratch.address, memory.ctypes.data, ctypes.addressof(sought))
-        while self._library.sf_seek(self._address, *addresses, *rest) == NO_ROOM:
-            system.make_room()
-        return there, sought
+        convex = self._layout.convex
+        if convex is not None:
+            rules.convex, rules.stiffness = ctypes.addressof(convex[0]), self._layout.tapes[0].parts[4]
+        known = self._own(varying)
+        inputs.groups, inputs.count, inputs.datum = len(varying), known[0].ctypes.data, known[1].ctypes.data
+        controls = (ctypes.addressof(rules), ctypes.addressof(inputs))
+        memory, point = np.empty(self._library.sf_find_size(self._address, *controls)), CorePoint(self)
+        # One call at a time has this memory.
+        lock, alive = threading.Lock(), (rules, inputs, known, convex)
 
-    def convex_of(self, model: Model) -> tuple[int, Array, int, list[Any]] | None:
-        """The tape of the positive matrices of elements, memory for it, and where they are among their results.
+        def found(row: Array, state: Array, begins: int) -> c.Sought | None:
+            sought, row = c.Sought(), c.doubles(row)
+            given = (row.ctypes.data, begins, state.ctypes.data)
+            rest = (point.address, memory.ctypes.data, ctypes.addressof(sought))
+            with lock:
+                while True:
+                    ended = self._library.sf_find(self._address, system.address, *controls, *given, *rest)
+                    if ended != NO_ROOM:
+                        break
+                    system.make_room()
+            return None if alive and ended else sought
 
-        None without elements, or of a kind of element whose function has none.  The list has what must live as long.
-        """
-        if not len(model.terms[0].data):
-            return None
-        tape = tape_of(model.element.convex)
-        if tape is None:
-            return None
-        table, arrays = c.table_of(tape)
-        return ctypes.addressof(table), np.empty(8 * tape.slots), self._layout.tapes[0].parts[4], [table, *arrays]
+        return found
+
+    def _own(self, varying: Sequence[int]) -> tuple[Array, Array]:
+        """Sizes and addresses of the data of groups, which are copied, so that they can be overwritten."""
+        data, groups = self._handed.data, self._handed.groups
+        for number in varying:
+            data[number] = data[number].copy()
+            groups[number].datum = data[number].ctypes.data
+        own = [data[number] for number in varying]
+        places = np.array([part.ctypes.data for part in own], dtype=np.uintp)
+        return c.integers(np.array([part.size for part in own])), places
+
+    @property
+    def searchable(self) -> bool:
+        """Whether it can run the globalised Newton method."""
+        return self._layout.searchable
 
     def negative(self, system: CoreSystem, entries: Array, counting: c.Counting) -> int | None:
         """Number of negative eigenvalues of a matrix; None where one is near zero, or factors do not tell."""
@@ -505,13 +552,8 @@ class CoreModel:
         varying : sequence of int
             Numbers of the groups whose data vary: they are overwritten, so that this model is no other's.
         """
-        for number in varying:
-            self._data[number] = self._data[number].copy()
-            self._groups[number].datum = self._data[number].ctypes.data
-        data = [self._data[number] for number in varying]
-        counts = c.integers(np.array([part.size for part in data]))
-        places = np.array([part.ctypes.data for part in data], dtype=np.uintp)
-        cases.groups, cases.count, cases.datum = len(data), counts.ctypes.data, places.ctypes.data
+        counts, places = self._own(varying)
+        cases.groups, cases.count, cases.datum = len(varying), counts.ctypes.data, places.ctypes.data
         addresses = [ctypes.addressof(part) for part in (cases, way, *limits, counting)]
         rest = (*addresses, self._scratch.address, self._following.ctypes.data)
         while self._library.sf_solve_cases(self._address, system.address, *rest) == NO_ROOM:

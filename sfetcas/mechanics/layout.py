@@ -82,6 +82,8 @@ class Layout:
         For each group of terms the unknowns of its sides, -1 where they have none.
     rows : list of ndarray
         For each group the multipliers of its rows.
+    given : dict of str to slice
+        Where the parts of what is given are in the row that :meth:`.Equations.given` makes of a loading.
     of_core
         The same as the core takes it, once it was made.
     programs : dict
@@ -107,10 +109,26 @@ class Layout:
         self.onto, self.share = unknown[self.used], tables.weight[cells[self.used]]
         self.retained = tables.place_number[(model.positions.retained >= 0).all(axis=1)]
         self.sliding = list(self._sliding(model))
+        self.given = self._places_of_given(model)
         self.of_core: Any = None
         self.programs: dict[Any, Any] = {}
         # What is kept keeps no scene alive.
         del tables.model
+
+    def _places_of_given(self, model: Model) -> dict[str, slice]:
+        axes = model.element.axes
+        on_places = len(model.segments.places) * axes
+        loads = [len(group.data) * group.kind.sizes[4] for group in model.connections]
+        sizes = {
+            "pull": len(model.segments.owner) * (model.element.order + 1) * axes,
+            **{f"loads {i}": size for i, size in enumerate(loads)},
+            "shift": on_places,
+            "opening": len(model.positions.rows),
+            "beside": self.tables.total,
+            "force": on_places,
+        }
+        ends = np.cumsum(list(sizes.values())).tolist()
+        return {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
 
     def tables_of(self, model: Model) -> Tables:
         """The tables of a model of this structure."""

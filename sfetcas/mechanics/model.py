@@ -305,11 +305,21 @@ class Model:
         parts = Parts(scene, self.mesh, self.element, self.scales, self.beams, self.segments, self.rotations)
         return unit_loadings(parts, self.connections)[motions[name].history].unloaded()
 
-    def prescribed_rotations(self, loading: Loading) -> Array:
-        """Rotations (rotations, components): prescribed ones at their values, all others undeformed."""
-        if not self.space:
-            return loading.turn[:, 2:3].copy()
-        return quaternion.from_rotation_vector(loading.turn)
+    def prescribed_rotations(self, vectors: Array) -> Array:
+        """Rotations (n, components) by vectors (n, 3), rad, of motions: zero for all that are undeformed."""
+        return quaternion.from_rotation_vector(vectors) if self.space else vectors[:, 2:3].copy()
+
+    def with_data(self, data: Mapping[int, Array]) -> Model:
+        """The model with other data (n, width) of groups of terms, by their numbers."""
+        connections, beams = list(self.connections), self.beams
+        for number, own in data.items():
+            if number:
+                connections[number - 1] = replace(connections[number - 1], data=own)
+            else:
+                sizes = [getattr(beams, name)[:1].size for name in ELEMENT_DATA]
+                parts = zip(ELEMENT_DATA, np.split(own, np.cumsum(sizes)[:-1], axis=1), strict=True)
+                beams = replace(beams, **{name: part.reshape(getattr(beams, name).shape) for name, part in parts})
+        return replace(self, connections=tuple(connections), beams=beams)
 
 
 def assemble(

@@ -112,13 +112,17 @@ class Unwrapping:
             gained = _dot(axis, turn[self.sides[:, 1]] - turn[self.sides[:, 0]])
         return self.angles(there, self.angles(q, unwrapped) + gained)
 
+    def held(self, kind: Index) -> Array:
+        """Which of the angles (n,) prescribed rotations and driven joints determine."""
+        held = np.asarray(np.append(kind == RotationFreedom.FIXED, True)[self.sides].all(axis=1))
+        held[[angle for angle, *_ in self.driven]] = True
+        return held
+
     def prescribed(self, kind: Index, loading: Loading) -> Array:
         """The angles (n,), rad, that prescribed rotations and driven joints determine; nan for all others."""
-        unwrapped = np.full(self.count, np.nan)
         if not self.count:
-            return unwrapped
-        fixed = np.append(kind == RotationFreedom.FIXED, True)[self.sides].all(axis=1)
-        unwrapped[fixed] = self.of_vectors(loading.turn)[fixed]
+            return np.zeros(0)
+        unwrapped = np.where(self.held(kind), self.of_vectors(loading.turn), np.nan)
         for angle, group, number, sign in self.driven:
             unwrapped[angle] = sign * float(loading.loads[group][number, 0])
         return unwrapped

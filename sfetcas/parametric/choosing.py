@@ -90,14 +90,14 @@ class Choosing:
         """A flat state of one solver for another one."""
         if one is other:
             return state
-        there = transferred(one.model, one.arguments.program.state(state), other.model)
-        return other.arguments.program.flat(there)
+        there = transferred(one.model, one.arguments.program.equations.state(state), other.model)
+        return there.flat
 
     # -- margins --------------------------------------------------------------------------------
 
     def margins(self, solver: EquilibriumSolver, numbers: Array, flat: Array) -> Mapping[Unilateral, float]:
         """The margin of each constraint, dimensionless, at an equilibrium for numbers (numbers,)."""
-        model, state = solver.model, solver.arguments.program.state(flat)
+        model, state = solver.model, solver.arguments.program.equations.state(flat)
         stops, found = model.mesh.stops, dict[Unilateral, float]()
         gaps = {side: self._gaps(side, model, numbers, state) for side in self._sides}
         for one in self.constraints:
@@ -116,9 +116,8 @@ class Choosing:
 
     def _gaps(self, side: str, model: Model, numbers: Array, state: object) -> dict[str, float]:
         gauge = self._gauges[side]
-        program = gauge.arguments.program
         there = transferred(model, state, gauge.arguments.model)  # type: ignore[arg-type]
-        residual = np.array(gauge.gaps(program.flat(there), gauge.prepare(numbers))).ravel()
+        residual = np.array(gauge.gaps(there.flat, gauge.prepare(numbers))).ravel()
         return dict(zip(gauge.arguments.model.row_names, residual.tolist(), strict=True))
 
     @functools.cached_property

@@ -24,6 +24,7 @@ from ..mechanics.accuracy import every_other
 from ..mechanics.contact_points import undeformed_vectors
 from ..mechanics.equations import State
 from ..mechanics.fields import transferred
+from ..mechanics.inputs import Inputs
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
 from ..solvers.globalised import MEANINGS, Code, Globalised, Outcome, Rules
@@ -100,14 +101,17 @@ class EquilibriumSolver:
     @functools.cached_property
     def method(self) -> Globalised:
         """The globalised Newton method."""
-        return Globalised(self.arguments.program, Prepared(self.model).weight, self.rules, self.followed_from)
+        prepared = Prepared(self.model)
+        inputs = Inputs(prepared.equations, self.arguments.program.varying)
+        return Globalised(inputs, prepared.weight, self.rules, self.followed_from)
 
     @property
     def followed_from(self) -> tuple[Array, Array] | None:
-        """What is given at the start, and its state, where equilibria are not followed from zero."""
+        """The row of inputs at the start, and its state, where equilibria are not followed from zero."""
         if self.begun is None or self.start is None:
             return None
-        return np.array(self.prepare(np.append(self.begun, self.arguments.places))).ravel(), self.start
+        given = self.prepare(np.append(self.begun, self.arguments.places))
+        return np.array(self.arguments.program.row(given)).ravel(), self.start
 
     @functools.cached_property
     def prepare(self) -> ca.Function:
@@ -205,7 +209,8 @@ class EquilibriumSolver:
         for _ in range(FITS):
             p = np.append(arguments, ends)
             given = np.array(self.prepare(p)).ravel()
-            outcome = self.method(given if good else given * np.nan, state, warm=warm)
+            row = np.array(known.program.row(given)).ravel()
+            outcome = self.method(row if good else row * np.nan, state, warm=warm)
             iterations += outcome.iterations
             outcome = replace(outcome, iterations=iterations, places=ends)
             if outcome.code not in SOLVED or not len(ends):
@@ -299,14 +304,14 @@ def equilibrium_solver(
     start = None
     if prepared.lacks_slack or any(node.start is not None for node in scene.nodes.values()):
         # Straight members without slack bend to no side by themselves; a start chooses one.
-        start = known.program.flat(prepared.guess(base.loading(scene.analysis.steps[-1]))[0])
+        start = prepared.guess(base.loading(scene.analysis.steps[-1]))[0].flat
     rules = Rules() if scene.analysis.unstable == "leave" else replace(Rules(), escapes=0)
     margins = margins_of(f"{name}_margins", base, known.arguments) if watched and scene.contacts else None
     solver = EquilibriumSolver(name, scene, known, outputs, rules, start, answer, margins)
     if mesh.points:
         # What touches does so near its answer alone.
         begun = in_contact(kept_of(scene, settings or Settings(), solved_from(answer)), solver.model)
-        solver = replace(solver, start=known.program.flat(begun), begun=known.defaults)
+        solver = replace(solver, start=begun.flat, begun=known.defaults)
         return _found(solver) if watched else solver
     return solver if start is not None or _same(solver) else replace(solver, start=_answered(solver))
 
@@ -322,7 +327,7 @@ def _found(solver: EquilibriumSolver) -> EquilibriumSolver:
 
 def _answered(solver: EquilibriumSolver) -> Array:
     """The answer of statics as a state to begin with."""
-    return solver.arguments.program.flat(transferred(solver.answer.model, solver.answer.state, solver.model))
+    return transferred(solver.answer.model, solver.answer.state, solver.model).flat
 
 
 def _same(solver: EquilibriumSolver) -> bool:
@@ -330,7 +335,7 @@ def _same(solver: EquilibriumSolver) -> bool:
     outcome, _ = solver.solve()
     if outcome.code not in SOLVED:
         return False
-    found, wanted = (solver.arguments.program.state(flat) for flat in (outcome.state, _answered(solver)))
+    found, wanted = (solver.arguments.program.equations.state(flat) for flat in (outcome.state, _answered(solver)))
     return Prepared(solver.model).distance(found, wanted) < ELSEWHERE
 
 

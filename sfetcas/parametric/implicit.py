@@ -301,7 +301,7 @@ class Implicit:
 
     @functools.cached_property
     def _places(self) -> tuple[Array, Array]:
-        return places_of(self._program.sparsity)
+        return places_of(self._program.matrix.sparsity())
 
     @functools.cached_property
     def _straight(self) -> SparseSolver:

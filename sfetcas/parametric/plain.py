@@ -26,15 +26,15 @@ from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..mathematics import interpolation
 from ..mathematics.arrays import Array, Index
-from ..mathematics.constants import sparse, times
+from ..mathematics.constants import sparse
 from ..mathematics.core import Cases, doubles, integers
 from ..mathematics.many import Many
 from ..mechanics.accuracy import WITHIN, gain, remaining
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import transferred
+from ..mechanics.inputs import Inputs
 from ..mechanics.mesh import Mesh, breaks_of
 from ..mechanics.model import Model, assemble
-from ..mechanics.rotations import RotationFreedom
 from ..mechanics.stations import Stations
 from ..solvers.continuation import FARTHEST, TRAVEL, plain_way
 from ..solvers.newton import Limits, limits_for_core
@@ -388,15 +388,13 @@ class _Level:
         # The one in which no entry vanishes by chance.
         self.model = model = self.arguments.model
         self.prepared = Prepared(model)
-        equations, parts = self.prepared.equations, self.arguments.program.sizes
-        self._zero = self.arguments.program.flat(equations.start(model.loading(0.0)))
+        equations = self.prepared.equations
+        self._zero = equations.start(model.loading(0.0)).flat
         self._p = ca.MX.sym("arguments", self.arguments.size)
-        named = [("stiffness", "tangent", "compliance"), *((f"data_{i}",) for i in range(len(model.connections)))]
         # Numbers of the groups whose data vary; elements are the first.
-        self._varying = [i for i, own in enumerate(named) if any(name in parts for name in own)]
-        # Prescribed rotations, if motions turn any.
-        held = np.flatnonzero(self.model.rotations.kind == RotationFreedom.FIXED)
-        self._turned = integers(held if "turn" in parts else held[:0])
+        self._varying = self.arguments.program.varying
+        self._inputs = Inputs(equations, self._varying)
+        self._turned = integers(self._inputs.turned)
         self.rows = self._of_rows()
         rest = self.arguments.undeformed(self._p)
         self.told = self._told_by(self.results.expression(self.arguments.program, rest))
@@ -408,17 +406,8 @@ class _Level:
 
     def _of_rows(self) -> Many:
         """(arguments) -> data that vary, then what is given, as the core takes them."""
-        program, expressions, positions = self.arguments.program, self.arguments.expressions, self.model.positions
-        given = program.given_by(self.arguments.given(self._p))
-        data = [expressions.data(0, given, ca.MX()) if i == 0 else given.data[i - 1] for i in self._varying]
-        equations = self.prepared.equations
-        beside = ca.MX.zeros(equations.total)
-        if equations.displacement_unknowns:
-            beside[equations.rotation_unknowns : equations.unknowns] = -times(positions.Y.T, given.force)
-        parts = [*data, given.pull, *given.loads, times(positions.B, given.shift), times(positions.BZ, given.shift)]
-        turn = ca.reshape(given.turn, 3, len(self.model.rotations.kind))
-        parts += [beside, given.force, turn[:, self._turned.tolist()]]
-        return Many(ca.Function("rows", [self._p], [ca.densify(ca.vertcat(*(ca.vec(part) for part in parts)))]))
+        row = self.arguments.program.row(self.arguments.given(self._p))
+        return Many(ca.Function("rows", [self._p], [row]))
 
     def _told_by(self, expression: ca.MX) -> Many:
         """A function of arguments and state, of an expression of the program."""
@@ -514,11 +503,8 @@ class _Level:
         if [len(group.data) for group in model.terms] != [len(group.data) for group in self.model.terms]:
             return False
         still = [i for i in range(len(model.terms)) if i not in self._varying]
-        loading = model.loading(factor)
-        own = [model.terms[i].data for i in (*self._varying, *still)]
-        own += [Equations(model).given(loading), loading.turn[self._turned]]
-        sizes = sum(model.terms[i].data.size for i in self._varying)
-        known = [row[:sizes], *(self.model.terms[i].data for i in still), row[sizes:]]
+        own = [self._inputs.of(model.loading(factor), Equations(model)), *(model.terms[i].data for i in still)]
+        known = [row, *(self.model.terms[i].data for i in still)]
         mine, other = (np.concatenate([part.ravel() for part in parts]) for parts in (known, own))
         return mine.shape == other.shape and bool(np.allclose(mine, other, rtol=SAME, atol=SAME * np.abs(other).max()))
 
@@ -563,17 +549,12 @@ class _Level:
 
     def _longest(self, rows: Array) -> Array:
         """The longest step (cases,) of the way of each case, which depends on how far motions lead."""
-        model, turns = self.model, 3 * len(self._turned)
-        end = rows.shape[1] - turns - 2 * self._places - self.prepared.equations.total - len(model.positions.rows)
-        travel = np.abs(rows[:, end : end + self._places]).max(axis=1, initial=0.0)
-        vectors = rows[:, rows.shape[1] - turns :].reshape(len(rows), len(self._turned), 3)
+        model, parts = self.model, self._inputs.parts
+        travel = np.abs(rows[:, parts["shift"]]).max(axis=1, initial=0.0)
+        vectors = rows[:, parts["vectors"]].reshape(len(rows), len(self._turned), 3)
         turned = np.linalg.norm(vectors, axis=2).max(axis=1, initial=0.0)
         driven = np.clip(np.maximum(travel / TRAVEL, turned), 1.0, FARTHEST)
         return np.asarray(1.0 / np.maximum(driven, turned if model.space else 0.0))
-
-    @property
-    def _places(self) -> int:
-        return len(self.model.segments.places) * self.model.element.axes
 
     def _stiffer(self, rows: Array) -> Array:
         """By how much members are stiffer (cases,) than those of the scene, at most: eigenvalues are larger by that."""

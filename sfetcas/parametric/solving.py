@@ -23,6 +23,7 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
 from ..mechanics.expressions import Expressions
 from ..mechanics.fields import transferred
+from ..mechanics.inputs import Inputs
 from ..mechanics.model import assemble
 from ..mechanics.unilateral import Stops, Unilateral
 from ..processes import cores
@@ -648,9 +649,10 @@ class ParametricAnswer:
         assembly: Any = model.assembly
         finer = assemble(scene, model.mesh.refined(), assembly=assembly, scales=model.scales)
         program = Program(Expressions(Equations(finer, kernels="interpreted"), "interpreted"))
-        given = program.given_of(finer.loading(scene.analysis.steps[-1]))
-        start = transferred(model, solver.arguments.program.state(self.outcome.state), finer)
-        outcome = Globalised(program, Prepared(finer).weight, solver.rules)(given, program.flat(start))
+        prepared, loading = Prepared(finer), finer.loading(scene.analysis.steps[-1])
+        start = transferred(model, solver.arguments.program.equations.state(self.outcome.state), finer)
+        inputs = Inputs(prepared.equations)
+        outcome = Globalised(inputs, prepared.weight, solver.rules)(inputs.of(loading), start.flat)
         if outcome.code not in SOLVED:
             raise SolveError(Status.FAILED, f"on half the elements: {MEANINGS[outcome.code]}", outcome)
         return program, outcome.state
@@ -661,7 +663,7 @@ class ParametricAnswer:
         if found is None:
             raise SolveError(Status.FAILED, "what touches was not found on half the elements", self.outcome)
         program = Program(Expressions(Equations(found.model, kernels="interpreted"), "interpreted"))
-        return program, program.flat(found.state)
+        return program, found.state.flat
 
     def certified(self) -> Equilibrium:
         """The equilibrium that :func:`~sfetcas.solve` finds for the same values, with its own mesh, branch and

@@ -51,7 +51,7 @@ class Touching:
         scene = arguments.scene_at(numbers)
         mesh = arguments.mesh_at(scene, model.mesh, outcome.places)
         own = Prepared(assemble(scene, mesh, assembly=model.assembly, scales=model.scales))  # type: ignore[arg-type]
-        loading, state = own.model.loading(scene.analysis.steps[-1]), arguments.program.state(outcome.state)
+        loading, state = own.model.loading(scene.analysis.steps[-1]), arguments.program.equations.state(outcome.state)
         return kept_of(scene, self.settings, Solved.taken(own, state, loading))
 
     def may_stay(self, solver: EquilibriumSolver, numbers: Array, outcome: Outcome, start: Fields) -> bool:
@@ -90,7 +90,7 @@ class Touching:
             raise SolveError(Status.FAILED, error.bare, answer.state) from None
         solver = self._solver(mesh)
         begun = in_contact(kept_of(scene, self.settings, solved_from(answer)), solver.model)
-        return solver, solver.arguments.program.flat(begun)
+        return solver, begun.flat
 
     def forget_lines(self) -> None:
         """Forget the solvers of lines, which end elsewhere for each number, but for the first."""

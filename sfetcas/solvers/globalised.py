@@ -9,9 +9,8 @@ followed from zero loads.  Where something touches nothing is least in where it 
 equilibrium, and where they fail what is given becomes another little by little.
 From an equilibrium for other values Newton's whole steps are tried first.
 
-Every operation on numbers is one of a :class:`Method`: the functions of :class:`~sfetcas.solvers.program.Program`,
-whose numbers generated C has to the last bit, with the same decisions and the same :class:`Rules`; or
-:class:`~sfetcas.solvers.evaluated.Evaluated`, which makes nothing for a model.
+The core does all of it at once, in process and in generated C, by ``sf_find``; where there is none, what follows here
+takes the same decisions by the same :class:`Rules`.
 
 Sources: Nocedal and Wright 2006, chapters 3 and 18 (line search on an l1 merit function); Vanderbei 1995
 (quasidefinite matrices have factors in any order).
@@ -21,18 +20,23 @@ from __future__ import annotations
 
 import enum
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from .. import tolerances
-from ..mathematics.arrays import TINY, Array, Index
-from ..mechanics.equations import Equations
-from ..mechanics.model import Model
+from ..mathematics.arrays import TINY, Array
+from ..mathematics.core import Inputs as CoreInputs
+from ..mathematics.core import Rules as CoreRules
+from ..mathematics.core import Sought, doubles, integers
+from ..mathematics.linear import InertiaSolver, SparseSolver
+from ..mechanics.equations import State
+from ..mechanics.inputs import Inputs, Taken
+from .residuals import LEAST_SCALE, relative_residual
 from .sides import Sides
 
-__all__ = ["MEANINGS", "NOT_DEFINED", "Code", "Globalised", "Method", "Outcome", "Rules", "Shifts", "Systems"]
+__all__ = ["MEANINGS", "NOT_DEFINED", "Code", "Globalised", "Outcome", "Rules"]
 
 
 class Code(enum.IntEnum):
@@ -153,7 +157,7 @@ class Outcome:
     ----------
     code : Code
     state : ndarray (states,)
-        As :meth:`~sfetcas.solvers.program.Program.state` reads it; nan for a bad argument.
+        As :meth:`~sfetcas.mechanics.equations.Equations.state` reads it; nan for a bad argument.
     residual : float
         Largest residual over its scale, dimensionless.
     negative : int
@@ -173,157 +177,49 @@ class Outcome:
 
 @dataclass(frozen=True)
 class _Here:
-    """A state with the results of :meth:`Method.at`; ``size`` is the relative residual, ``gaps`` a sum."""
+    """A state with the equations there; ``size`` is the relative residual, ``gaps`` a sum of magnitudes."""
 
-    state: Any
+    state: State
     residual: Array
     size: float
     potential: float
     gaps: float
-    entries: Any
-
-
-class Shifts(NamedTuple):
-    """How the diagonals of matrices are shifted: see :class:`Globalised` and :class:`Rules`."""
-
-    proximal: float
-    mass: Array
-    soft: Array
-    diagonal: Index
-
-    def shifted(self, entries: Array, firm: float, share: float) -> tuple[Array, Array]:
-        """The entries that are solved for, and those of the matrix that is factorised."""
-        target = entries.copy()
-        target[self.diagonal] += (self.proximal + firm) * self.mass
-        matrix = target.copy()
-        matrix[self.diagonal] += share * self.soft
-        return target, matrix
-
-
-class Systems(Protocol):
-    """Linear systems of the method."""
-
-    def shift(self, entries: Any, firm: float, share: float) -> None:
-        """Take a matrix with its diagonal shifted."""
-
-    def negative(self) -> int | None:
-        """Factorise it: the number of its negative pivots; None where factors break down."""
-
-    def backward(self, b: Array) -> Array:
-        """Solution (total,) with these factors, or with pivoting."""
-
-    def left(self, x: Array, b: Array) -> Array:
-        """What is left (total,) of b without the further regularisation."""
-
-
-class Method(Protocol):
-    """Operations on numbers of which the method consists; states and what is given are of types of their own."""
-
-    model: Model
-    equations: Equations
-
-    @property
-    def states(self) -> int:
-        """Numbers of a state."""
-
-    @property
-    def diagonal(self) -> Index:
-        """Positions of the diagonal among the entries of the matrix."""
-
-    def systems(self, shifts: Shifts, *, factors: bool, pivoted: bool) -> Systems:
-        """Its linear systems."""
-
-    def is_finite(self, given: Any) -> bool:
-        """Whether all that is given is."""
-
-    def turns(self, given: Any) -> bool:
-        """Whether there are moments."""
-
-    def taken(self, given: Any) -> Any:
-        """What is given as the other methods take it."""
-
-    def shared(self, given: Any, share: float) -> Any:
-        """The same with a share of all loads and motions."""
-
-    def standing(self, flat: Array) -> Any:
-        """The state of a vector (states,)."""
-
-    def flattened(self, state: Any) -> Array:
-        """The vector (states,) of a state."""
-
-    def multipliers(self, state: Any) -> Array:
-        """Its multipliers (rows,)."""
-
-    def begin(self, given: Any) -> Any:
-        """The undeformed state with prescribed rotations at their values."""
-
-    def hold(self, state: Any, given: Any) -> Any:
-        """A state with prescribed rotations at their values."""
-
-    def at(self, state: Any, given: Any) -> Any:
-        """Residual (total,), relative residual, potential, sum of gaps, and entries of the matrix."""
-
-    def merit(self, state: Any, given: Any) -> Any:
-        """Potential and sum of gaps."""
-
-    def convex(self, state: Any, given: Any) -> Any:
-        """Entries of the matrix with positive matrices of the elements."""
-
-    def move(self, state: Any, step: Array, share: float) -> Any:
-        """The state after a share of a step (total,)."""
-
-    def seek(
-        self, method: Globalised, state: Any, given: Any, whole: int, left: int
-    ) -> tuple[Code, Any, float, int, int] | None:
-        """What :class:`Globalised` finds from a state, at once; None where it has to do it step by step.
-
-        Parameters
-        ----------
-        method : Globalised
-        state, given
-        whole : int
-            Whole steps at most, from a near state; 0 for the way downhill and out of what is unstable.
-        left : int
-            Iterations at most.
-
-        Returns
-        -------
-        Code, state, relative residual, number of negative eigenvalues, iterations that were not needed
-        """
+    entries: Array
 
 
 class Globalised:
-    """The method for one program.
+    """The method for one model.
 
     Parameters
     ----------
-    program : Method
+    inputs : Inputs
+        What varies, with the equations.
     weight : ndarray (rotation unknowns,)
         See :class:`~sfetcas.solvers.stability.StabilityTest`.
     rules : Rules, optional
-    begun : (ndarray (given,), ndarray (states,)), optional
+    begun : (ndarray (inputs,), ndarray (states,)), optional
         What is given at an equilibrium, and its state, from which others are followed; by default they are from zero.
 
     Attributes
     ----------
+    equations : Equations
     mass, soft, seed : ndarray (total,)
         Diagonal of shifts and of the proximal term; signs of the further regularisation; start vector for the lowest
         mode.
-    diagonal : ndarray (total,)
-        Positions of the diagonal among the entries of the matrix.
     pivoted : bool
         Whether systems are solved by factors with pivots.
     """
 
     def __init__(
         self,
-        program: Method,
+        inputs: Inputs,
         weight: Array,
         rules: Rules | None = None,
         begun: tuple[Array, Array] | None = None,
     ) -> None:
-        self.program, self.rules, self.begun = program, rules or Rules(), begun
-        equations = program.equations
+        self.inputs, self.rules, self.begun = inputs, rules or Rules(), begun
+        self.equations = equations = inputs.equations
+        self._model = model = equations.model
         self._rotation_unknowns, self._unknowns, self._total = (
             equations.rotation_unknowns,
             equations.unknowns,
@@ -336,50 +232,138 @@ class Globalised:
         self.soft = np.repeat(
             [0.0, 1.0, -1.0], [self._rotation_unknowns, self._unknowns - self._rotation_unknowns, equations.rows]
         )
-        self.diagonal = program.diagonal
-        self._symmetric = program.model.has_potential
+        self._symmetric = model.has_potential
         # Where a line ends the Lagrangian has no curvature along the member: there is no order without small pivots.
-        self.pivoted = not self._symmetric or program.model.mesh.lies
-        self._sliding = program.model.mesh.sliding
-        shifts = Shifts(self.rules.proximal, self.mass, self.soft, self.diagonal)
-        self._systems = program.systems(shifts, factors=self._symmetric and self._total > 0, pivoted=self.pivoted)
-        self._left = 0
+        self.pivoted = not self._symmetric or model.mesh.lies
+        self._sliding = model.mesh.sliding
+        self._left, self._free = 0, True
 
     @functools.cached_property
     def seed(self) -> Array:
         """Start vector (total,) for the lowest mode: the fields of the rule of sides, and tiny displacements."""
         beside = LEAST / (1.0 + np.arange(self._unknowns - self._rotation_unknowns))
-        equations = self.program.equations
-        return np.concatenate([Sides(equations).seed, beside, np.zeros(equations.rows)])
+        return np.concatenate([Sides(self.equations).seed, beside, np.zeros(self.equations.rows)])
 
-    def _sought(self, state: Any, given: Any, whole: int = 0) -> Outcome | None:
-        """What is found at once, see :meth:`Method.seek`."""
-        found = self.program.seek(self, state, given, whole, self._left)
-        if found is None:
+    # -- by the core ----------------------------------------------------------------------------------
+
+    def _searching(self, *, seeded: bool) -> Callable[[Array, Array, int], Sought | None] | None:
+        """The core's method, with or without the seed, which is seldom needed; None without a core."""
+        known = self.equations.for_search(self.inputs.varying)
+        if known is None:
             return None
-        code, there, residual, negative, self._left = found
-        return Outcome(code, self.program.flattened(there), residual, negative, 0)
+        core, system = known
+        rules, inputs, alive = self.for_core(seeded=seeded)
+        search = core.search(system, rules, inputs, self.inputs.varying)
+
+        def found(row: Array, state: Array, begins: int) -> Sought | None:
+            return search(row, state, begins) if alive else None
+
+        return found
+
+    @functools.cached_property
+    def _search(self) -> Callable[[Array, Array, int], Sought | None] | None:
+        return self._searching(seeded=False)
+
+    @functools.cached_property
+    def _seeded(self) -> Callable[[Array, Array, int], Sought | None] | None:
+        return self._searching(seeded=True)
+
+    def for_core(self, *, seeded: bool = True) -> tuple[CoreRules, CoreInputs, list[Array]]:
+        """Rules and inputs as the core takes them, without its tape and data, and the arrays that they point to."""
+        model, inputs, rules = self._model, self.inputs, self.rules
+        arrays: dict[str, Array] = {
+            "mass": doubles(self.mass),
+            "sides": doubles(self.soft),
+            **({"seed": doubles(self.seed)} if seeded and model.downhill else {}),
+        }
+        of_inputs: dict[str, Array] = {
+            "turned": integers(inputs.turned),
+            "held": integers(inputs.held),
+            "couple": integers(np.array(inputs.couples)),
+            "rest": doubles(inputs.rest.flat),
+            **({} if self.begun is None else dict(zip(("begun", "reached"), map(doubles, self.begun), strict=True))),
+        }
+        known = CoreRules(
+            symmetric=self._symmetric,
+            minimisable=model.minimisable,
+            downhill=model.downhill,
+            pivoted=self.pivoted,
+            sliding=self._sliding,
+            level=tolerances.LEVEL,
+            least=LEAST_SCALE,
+            **vars(rules),
+            **{name: array.ctypes.data for name, array in arrays.items()},
+        )
+        given = CoreInputs(
+            turning=len(inputs.turned),
+            couples=len(inputs.couples),
+            **{name: array.ctypes.data for name, array in of_inputs.items()},
+        )
+        return known, given, [*arrays.values(), *of_inputs.values()]
+
+    def _by_core(self, row: Array, start: Array | None, *, warm: bool) -> Outcome | None:
+        """The outcome by the core; None without one."""
+        if self._search is None:
+            return None
+        begins = 0 if start is None else 2 if warm else 1
+        for search in (self._search, lambda *given: self._seeded(*given) if self._seeded else None):
+            state = np.full(self.states, np.nan) if start is None else np.array(start, dtype=float)
+            sought = search(row, state, begins)
+            if sought is not None:
+                return Outcome(Code(sought.status), state, sought.residual, sought.negative, sought.iterations)
+        return None
+
+    @functools.cached_property
+    def states(self) -> int:
+        """Numbers of a state."""
+        return len(self.inputs.rest.flat)
 
     # -- linear algebra -----------------------------------------------------------------------------
 
-    def _factor(self, entries: Any, firm: float) -> int:
+    @functools.cached_property
+    def _factors(self) -> InertiaSolver:
+        return InertiaSolver(self._total, self.equations.row, self.equations.column)
+
+    @functools.cached_property
+    def _solver(self) -> SparseSolver:
+        equations = self.equations
+        return SparseSolver(self._total, equations.row, equations.column, equations.rows, symmetric=False)
+
+    def _shift(self, entries: Array, firm: float, share: float) -> None:
+        """Take a matrix with its diagonal shifted: the entries that are solved for, and those that are factorised."""
+        diagonal = self.equations.diagonal
+        self._target = entries.copy()
+        self._target[diagonal] += (self.rules.proximal + firm) * self.mass
+        self._matrix = self._target.copy()
+        self._matrix[diagonal] += share * self.soft
+
+    def _factor(self, entries: Array, firm: float) -> int:
         """Factorise a matrix with its diagonal shifted; the number of its negative pivots less that of rows.
 
         Nor are places that slide counted.  :data:`FAILED` if the factors break down, 0 for unsymmetric matrices.
         """
-        systems = self._systems
-        systems.shift(entries, firm, self.rules.soft)
+        self._shift(entries, firm, self.rules.soft)
         if not self._symmetric or not self._total:
             return 0
-        pivots = systems.negative()
-        if pivots is None:
+        try:
+            self._factors.factor(self._matrix)
+        except np.linalg.LinAlgError:
             return FAILED
+        pivots = self._factors.negative()
         if self.pivoted:
-            systems.shift(entries, firm, self.rules.hard)
+            self._shift(entries, firm, self.rules.hard)
         return pivots - (self._total - self._unknowns) - self._sliding
 
     def _backward(self, b: Array) -> Array:
-        return self._systems.backward(b) if self._total else b
+        if not self._total:
+            return b
+        try:
+            if not self.pivoted:
+                return np.asarray(self._factors.solve(b[:, None])[:, 0])
+            self._solver.factor(self._matrix)
+            return np.asarray(self._solver.solve(b))
+        except np.linalg.LinAlgError:
+            return np.full(b.shape, np.nan)
 
     def _solved(self, b: Array) -> Array | None:
         """Solution (total,) for the last matrix without the further regularisation, by refinement; None if it fails."""
@@ -387,7 +371,8 @@ class Globalised:
         largest = float(np.abs(b).max(initial=0.0))
         for _ in range(self.rules.rounds):
             x = x + self._backward(left)
-            left = self._systems.left(x, b)
+            given = self._target * x[self.equations.column]
+            left = np.asarray(b - np.bincount(self.equations.row, weights=given, minlength=len(b)))
             size = float(np.abs(left).max(initial=0.0))
             if not size < last:
                 break
@@ -401,9 +386,9 @@ class Globalised:
         negative = self._factor(here.entries, 0.0)
         return (None if negative == FAILED else self._solved(-here.residual)), negative
 
-    def _downwards(self, here: _Here, given: Any) -> Array | None:
+    def _downwards(self, here: _Here, given: Taken) -> Array | None:
         """A descent direction (total,) from a matrix that is positive on the closings; None if no shift gives one."""
-        entries = self.program.convex(here.state, given)
+        entries = given.equations.convex_entries(here.state, given.given)
         firm = 0.0
         while firm < FIRMEST:
             if self._factor(entries, firm) == 0:
@@ -415,13 +400,14 @@ class Globalised:
 
     # -- states ---------------------------------------------------------------------------------------
 
-    def _at(self, state: Any, given: Any) -> _Here:
-        residual, size, potential, gaps, entries = self.program.at(state, given)
-        flat = np.asarray(residual, dtype=float).ravel()
-        return _Here(state, flat, float(size), float(potential), float(gaps), entries)
+    def _at(self, state: State, given: Taken) -> _Here:
+        point = given.equations.under(state, given.given)
+        gaps = float(np.abs(point.residual[self._unknowns :]).sum())
+        size = relative_residual(given.equations, point)
+        return _Here(state, point.residual, size, point.potential, gaps, point.entries)
 
-    def _moved(self, state: Any, step: Array, share: float) -> Any:
-        return self.program.move(state, step, share)
+    def _moved(self, state: State, step: Array, share: float) -> State:
+        return self.equations.moved(state, share * step)
 
     def _length(self, step: Array) -> float:
         return float(np.abs(step[: self._rotation_unknowns]).max(initial=0.0))
@@ -430,66 +416,65 @@ class Globalised:
 
     # Overflow is detected by results that are not finite, as in C.
     @np.errstate(over="ignore", invalid="ignore")
-    def __call__(self, given: Any, start: Array | None = None, *, warm: bool = False) -> Outcome:
+    def __call__(self, row: Array, start: Array | None = None, *, warm: bool = False) -> Outcome:
         """Solve for an equilibrium.
 
         Parameters
         ----------
-        given : ndarray (given,) or Loading
-            Loads and data that vary, dimensionless, as the method takes them: see
-            :meth:`~sfetcas.solvers.program.Program.given_of`.
+        row : ndarray (inputs,)
+            Data that vary, loads and motions, see :class:`~sfetcas.mechanics.inputs.Inputs`.
         start : ndarray (states,), optional
             State to begin with; the undeformed one by default.
         warm : bool
             Whether that is an equilibrium for other values, from which whole steps are tried first.
         """
-        program, rules = self.program, self.rules
-        if not program.is_finite(given) or (start is not None and not np.isfinite(start).all()):
-            return Outcome(Code.BAD_ARGUMENT, np.full(program.states, np.nan), np.inf, NOT_DEFINED, 0)
-        self._left = rules.iterations
-        self._free = not program.turns(given)
-        whole = program.taken(given)
-        state = program.begin(whole) if start is None else program.hold(program.standing(start), whole)
-        found = self._near(state, whole) if warm else None
-        found = found or self._from(state, whole)
+        return self._by_core(row, start, warm=warm) or self._step_by_step(row, start, warm=warm)
+
+    def _step_by_step(self, row: Array, start: Array | None, *, warm: bool) -> Outcome:
+        """The outcome without the core."""
+        rules, inputs, minimisable = self.rules, self.inputs, self._model.minimisable
+        if not np.isfinite(row).all() or (start is not None and not np.isfinite(start).all()):
+            return Outcome(Code.BAD_ARGUMENT, np.full(self.states, np.nan), np.inf, NOT_DEFINED, 0)
+        self._left, self._free = rules.iterations, not inputs.turns(row)
+        taken = inputs.taken(row)
+        state = inputs.begun(taken) if start is None else inputs.holding(self.equations.state(start), taken)
+        found = self._near(state, taken) if warm else None
+        found = found or self._from(state, taken)
         if found.code not in (Code.SOLVED, Code.UNSTABLE) and self._left:
-            followed = self._followed(given)
+            followed = self._followed(row)
             found = followed if followed.code is Code.SOLVED else found
-        if found.code is Code.SOLVED and found.negative > 0 and program.model.minimisable:
+        if found.code is Code.SOLVED and found.negative > 0 and minimisable:
             found = replace(found, code=Code.UNSTABLE)
         if found.code in (Code.SOLVED, Code.UNSTABLE) and not np.isfinite(found.state).all():
             found = replace(found, code=Code.NOT_FINITE)
         return replace(found, iterations=rules.iterations - self._left)
 
-    def _near(self, state: Any, given: Any) -> Outcome | None:
+    def _near(self, state: State, given: Taken) -> Outcome | None:
         """By whole steps to an equilibrium that need not be left; None where they do not lead to one."""
-        found = self._by_whole_steps(state, given, self.rules.corrections)
+        found = self._corrected(self._at(state, given), given, self.rules.corrections)
         if found.code is not Code.SOLVED:
             return None
-        if found.negative <= 0 or not self.program.model.minimisable:
+        if found.negative <= 0 or not self._model.minimisable:
             return found
-        leaves = self.rules.escapes and self.program.model.downhill
+        leaves = self.rules.escapes and self._model.downhill
         return None if leaves else replace(found, code=Code.UNSTABLE)
 
-    def _from(self, state: Any, given: Any) -> Outcome:
+    def _from(self, state: State, given: Taken) -> Outcome:
         """Downhill from a state to an equilibrium, and on from unstable ones, ``escapes`` times."""
-        program = self.program
-        if not program.model.downhill:
-            return self._by_whole_steps(state, given, self._left)
-        sought = self._sought(state, given)
-        if sought is not None:
-            return sought
-        for _ in range(self.rules.escapes + 1):
+        if not self._model.downhill:
+            return self._corrected(self._at(state, given), given, self._left)
+        for escape in range(self.rules.escapes + 1):
             found = self._descended(self._at(state, given), given)
             if found.code is not Code.SOLVED or found.negative <= 0:
                 return found
-            state = self._nudged(program.standing(found.state), given)
+            if escape < self.rules.escapes:
+                state = self._nudged(self.equations.state(found.state), given)
         return replace(found, code=Code.UNSTABLE)
 
     def _ended(self, code: Code, here: _Here, negative: int = NOT_DEFINED) -> Outcome:
-        return Outcome(code, self.program.flattened(here.state), here.size, negative, 0)
+        return Outcome(code, here.state.flat, here.size, negative, 0)
 
-    def _descended(self, here: _Here, given: Any) -> Outcome:
+    def _descended(self, here: _Here, given: Taken) -> Outcome:
         """Downhill to an equilibrium, stable or not."""
         rules, scale, first = self.rules, 1.0, True
         while self._left:
@@ -522,39 +507,35 @@ class Globalised:
             here, scale = found
         return self._ended(Code.ITERATIONS, here)
 
-    def _shortened(self, here: _Here, step: Array, scale: float, given: Any) -> tuple[_Here, float] | None:
+    def _shortened(self, here: _Here, step: Array, scale: float, given: Taken) -> tuple[_Here, float] | None:
         """The state after a step that is halved until potential and gaps fall enough, and its share; None if never."""
         rules, n = self.rules, self._unknowns
-        lam = self.program.multipliers(here.state)
+        lam = here.state.lam
         penalty = 2.0 * float(np.abs(lam + step[n:]).max(initial=0.0))
         # The slope of the potential alone: the residual without the multipliers' share.
         slope = float(here.residual[:n] @ step[:n]) + float(lam @ here.residual[n:]) - penalty * here.gaps
         slope, before = min(slope, 0.0), here.potential + penalty * here.gaps
-        for halving in range(rules.halvings):
+        for _ in range(rules.halvings):
             state = self._moved(here.state, step, scale)
-            if halving == 0:
-                there = self._at(state, given)
-                potential, gaps = there.potential, there.gaps
-            else:
-                potential, gaps = (float(value) for value in self.program.merit(state, given))
+            there = self._at(state, given)
             wanted = rules.armijo * (scale - 0.5 * scale**2) * slope
-            if potential + penalty * gaps - before <= wanted + rules.noise * abs(before):
-                return (there if halving == 0 else self._at(state, given)), scale
+            if there.potential + penalty * there.gaps - before <= wanted + rules.noise * abs(before):
+                return there, scale
             scale *= 0.5
         return None
 
     # -- out of what is unstable ----------------------------------------------------------------------
 
-    def _nudged(self, state: Any, given: Any) -> Any:
+    def _nudged(self, state: State, given: Taken) -> State:
         """The state displaced along its lowest mode to the side of lower energy."""
         shape = self._softest(self._at(state, given).entries)
         shape *= self.rules.nudge / max(self._length(shape), TINY)
         sides = [self._moved(state, shape, share) for share in (1.0, -1.0)]
-        up, down = (float(self.program.merit(side, given)[0]) for side in sides)
+        up, down = (self._at(side, given).potential for side in sides)
         # A symmetric pair differs by rounding only: then the first side, so that answers repeat.
         return sides[1] if up - down > tolerances.LEVEL * max(abs(up), abs(down)) else sides[0]
 
-    def _softest(self, entries: Any) -> Array:
+    def _softest(self, entries: Array) -> Array:
         """The mode (total,) of the lowest eigenvalue, largest entry 1, by inverse iteration with a shift below it."""
         firm = self.rules.firm
         while self._factor(entries, firm) != 0 and firm < FIRMEST:
@@ -568,42 +549,35 @@ class Globalised:
 
     # -- loads that grow ------------------------------------------------------------------------------
 
-    def _followed(self, given: Array) -> Outcome:
+    def _followed(self, row: Array) -> Outcome:
         """The equilibrium that is reached as the loads grow from zero, or what is given becomes another."""
-        program, rules = self.program, self.rules
-        begin = program.begin(self._shared(given, 0.0)) if self.begun is None else program.standing(self.begun[1])
-        share, reached, step = 0.0, begin, 1.0
-        found = None
+        equations, inputs, rules = self.equations, self.inputs, self.rules
+        share, step, found = 0.0, 1.0, None
+        reached = inputs.begun(self._shared(row, 0.0)) if self.begun is None else equations.state(self.begun[1])
         while share < 1.0 and self._left:
             there = min(1.0, share + step)
-            loads = self._shared(given, there)
-            there_begun = program.hold(reached, loads)
-            found = self._by_whole_steps(there_begun, loads, rules.corrections)
+            taken = self._shared(row, there)
+            found = self._corrected(self._at(inputs.holding(reached, taken), taken), taken, rules.corrections)
             if found.code is Code.SOLVED:
-                share, reached, step = there, program.standing(found.state), 2.0 * step
+                share, reached, step = there, equations.state(found.state), 2.0 * step
                 continue
             step *= 0.5
             if step < rules.shortest:
                 return found
         if found is None or share < 1.0:
-            return Outcome(Code.ITERATIONS, program.flattened(reached), np.inf, NOT_DEFINED, 0)
-        if found.negative > 0 and rules.escapes and program.model.downhill:
-            whole = program.taken(given)
+            return Outcome(Code.ITERATIONS, reached.flat, np.inf, NOT_DEFINED, 0)
+        if found.negative > 0 and rules.escapes and self._model.downhill:
+            whole = inputs.taken(row)
             return self._from(self._nudged(reached, whole), whole)
         return found
 
-    def _shared(self, given: Any, share: float) -> Any:
+    def _shared(self, row: Array, share: float) -> Taken:
         """What is given with a share of all loads and motions, but for data; or on the way to it from the start."""
-        if self.begun is not None:
-            return self.program.taken(self.begun[0] + share * (given - self.begun[0]))
-        return self.program.shared(given, share)
+        if self.begun is None:
+            return self.inputs.taken(self.inputs.shared(row, share))
+        return self.inputs.taken(self.begun[0] + share * (row - self.begun[0]))
 
-    def _by_whole_steps(self, state: Any, given: Any, most: int) -> Outcome:
-        """Newton's method from a near state."""
-        sought = self._sought(state, given, most) if most else None
-        return sought or self._corrected(self._at(state, given), given, most)
-
-    def _corrected(self, here: _Here, given: Any, most: int) -> Outcome:
+    def _corrected(self, here: _Here, given: Taken, most: int) -> Outcome:
         """Newton's method from a near state."""
         rules, last, first = self.rules, np.inf, True
         for _ in range(min(most, self._left)):

@@ -21,12 +21,12 @@ from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt, NLPResult
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.fields import Fields
+from ..mechanics.inputs import Inputs
 from ..mechanics.loading import Loading
 from ..mechanics.memory import Remembering
 from ..mechanics.model import Model
 from .constraints import Diagnosis, contradiction, diagnose, free_motions
 from .divergence import TangentTest
-from .evaluated import Evaluated
 from .globalised import Code, Globalised, Rules
 from .guess import first_guess, lacks_slack, restore
 from .newton import AtLoads, Limits, correct, limits_for_core
@@ -346,17 +346,17 @@ class Prepared:
 
     @functools.cached_property
     def _globalised(self) -> Globalised:
-        return Globalised(Evaluated(self.equations), self.weight, Rules(escapes=0))
+        return Globalised(Inputs(self.equations), self.weight, Rules(escapes=0))
 
     def globalised(self, loading: Loading) -> tuple[Solved | None, int]:
         """The equilibrium by the globalised Newton method, stable or not, and its iterations; None if it fails."""
         method, start = self._globalised, None
         if self.lacks_slack or self.started:
-            start = method.program.flattened(self.guess(loading)[0])
-        outcome = method(loading, start)
+            start = self.guess(loading)[0].flat
+        outcome = method(method.inputs.of(loading), start)
         if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
             return None, outcome.iterations
-        found = self.correct(method.program.standing(outcome.state), loading)
+        found = self.correct(self.equations.state(outcome.state), loading)
         return (found if found.residual <= tolerances.BALANCED else None), outcome.iterations
 
     def downhill(self, state: State, loading: Loading) -> Solved | None:

@@ -315,7 +315,7 @@ class EquilibriumProblem:
         """Values (parameters,) of the parameters for a loading; angles that count turns are those near a state's."""
         model, positions = self.model, self.model.positions
         rest = np.where(
-            (model.rotations.kind == RotationFreedom.FIXED)[:, None], model.prescribed_rotations(loading), 0.0
+            (model.rotations.kind == RotationFreedom.FIXED)[:, None], model.prescribed_rotations(loading.turn), 0.0
         )
         hanging = (positions.E.T @ loading.force.ravel()).reshape(-1, model.element.axes)
         pull = loading.pull - hanging[model.segments.owner][:, None, :]
@@ -368,7 +368,7 @@ class EquilibriumProblem:
         """
         model, tables = self.model, self._tables
         rest = np.where(
-            (model.rotations.kind == RotationFreedom.FIXED)[:, None], model.prescribed_rotations(loading), 0.0
+            (model.rotations.kind == RotationFreedom.FIXED)[:, None], model.prescribed_rotations(loading.turn), 0.0
         )
         unknown, weight = tables.unknown[: tables.of_places], tables.weight[: tables.of_places]
         q = rest + (weight * np.append(x, 0.0)[unknown]).reshape(rest.shape)

@@ -1,9 +1,8 @@
-"""The equilibrium of a model as functions of flat vectors, for the globalised Newton method and generated C.
+"""The equilibrium of a model as expressions of flat vectors, for results, derivatives, designs and generated C.
 
 A *state* is one vector (states,): rotations (quaternions or angles), displacements retained as unknowns, multipliers,
 and the values near which angles count turns.  What is *given* is another vector (given,): loads, motions, and data of
-the equations that vary.  All of it is dimensionless.  Every operation of the solver is a CasADi Function of these two,
-so that Python and C compute the same numbers.
+the equations that vary.  All of it is dimensionless.
 """
 
 from __future__ import annotations
@@ -16,21 +15,17 @@ import casadi as ca
 import numpy as np
 
 from ..mathematics.active import applied
-from ..mathematics.arrays import Array, Index, numbers
+from ..mathematics.arrays import Array, numbers
 from ..mathematics.constants import sparse, times
-from ..mathematics.linear import pattern, places_of
 from ..mechanics.beams import ELEMENT_DATA
-from ..mechanics.equations import State
-from ..mechanics.evaluation import UNLOADED
 from ..mechanics.expressions import LOADS, Expressions, Given, moved_by
+from ..mechanics.inputs import Inputs
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import RotationFreedom
 from ..mechanics.singles import counted_angle, turned_vector
 from ..mechanics.stationarity import Stationarity, summed
 from ..mechanics.terms import GROUND, energies_of
-from .globalised import Globalised, Shifts
-from .residuals import LEAST_SCALE
 
 __all__ = ["Program", "data_of", "is_data"]
 
@@ -111,62 +106,7 @@ class Program:
             return numbers(part.ravel() - applied(self.expressions.reaching.T, loading.force.ravel()))
         return numbers(part.ravel())
 
-    # -- as a method, see :class:`~sfetcas.solvers.globalised.Method` ------------------------------
-
-    # Large vectors stay in CasADi's type between functions: conversion costs more than most calls.
-
-    def systems(self, shifts: Shifts, *, factors: bool, pivoted: bool) -> _Systems:
-        """Linear systems of :class:`~sfetcas.solvers.globalised.Globalised`."""
-        return _Systems(self, shifts, factors=factors, pivoted=pivoted)
-
-    @functools.cached_property
-    def diagonal(self) -> Index:
-        """Positions of the diagonal among the entries of the matrix."""
-        row, column = places_of(self.sparsity)
-        return np.flatnonzero(row == column)
-
-    def is_finite(self, given: Array) -> bool:
-        """Whether all that is given is."""
-        return bool(np.isfinite(given).all())
-
-    def turns(self, given: Array) -> bool:
-        """Whether there are moments."""
-        return bool(given[self.slice_of_moments].any())
-
-    def taken(self, given: Array) -> ca.DM:
-        """What is given as the functions take it."""
-        return ca.DM(given)
-
-    def shared(self, given: Array, share: float) -> ca.DM:
-        """The same with a share of all loads and motions."""
-        loads = self.slice_of_loads
-        return ca.DM(np.concatenate([given[: loads.start], share * given[loads]]))
-
-    def standing(self, flat: Array) -> ca.DM:
-        """The state of a vector (states,) as the functions take it."""
-        return ca.DM(flat)
-
-    def seek(self, method: Globalised, state: ca.DM, given: ca.DM, whole: int, left: int) -> None:
-        """Not at once: every number is that of generated C."""
-
-    def flattened(self, state: ca.DM) -> Array:
-        """The vector (states,) of such a state."""
-        return np.array(state).ravel()
-
-    def multipliers(self, state: ca.DM) -> Array:
-        """Its multipliers (rows,)."""
-        return np.array(state[self._bounds[2] : self._bounds[3]]).ravel()
-
     # -- states -----------------------------------------------------------------------------------
-
-    def flat(self, state: State) -> Array:
-        """A state as one vector (states,)."""
-        return np.concatenate([state.q.ravel(), state.y, state.lam, state.unwrapped])
-
-    def state(self, flat: Array) -> State:
-        """The state of a vector (states,)."""
-        q, y, lam, unwrapped = np.split(flat, self._bounds[1:-1])
-        return State(q.reshape(-1, self.expressions.layout.components), y, lam, unwrapped)
 
     def _split(self, state: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
         q, y, lam, unwrapped = ca.vertsplit(state, self._bounds)
@@ -197,7 +137,9 @@ class Program:
     @functools.cached_property
     def matrix(self) -> ca.MX:
         """Newton's matrix, (total, total)."""
-        return self._matrix(self.stationarity.entries)
+        entries, tables = self.stationarity.entries, self.expressions.tables
+        # With its whole diagonal, for regularisation.
+        return summed((self.expressions.total,) * 2, tables.whole, ca.vertcat(*entries, ca.MX(1), ca.MX(0)))
 
     @functools.cached_property
     def _energies(self) -> tuple[ca.MX, ca.MX]:
@@ -294,18 +236,6 @@ class Program:
     # -- functions ----------------------------------------------------------------------------------
 
     @functools.cached_property
-    def begin(self) -> ca.Function:
-        """(given) -> the undeformed state with fixed rotations at their prescribed values."""
-        n = self.expressions.layout
-        q = ca.DM.zeros(n.components, n.rotations)
-        if self.model.space:
-            q[0, :] = 1.0
-        parts = [ca.vec(self.expressions.with_prescribed_rotations(ca.MX(q), self.given)), ca.MX.zeros(n.y + n.lam)]
-        if n.unwrapped:
-            parts.append(self._prescribed_unwrapped(self._prescribed()))
-        return self._function("begin", {"given": self.symbol}, {"state": ca.densify(ca.vertcat(*parts))})
-
-    @functools.cached_property
     def prescribed_expression(self) -> ca.MX:
         """The state (states,) with fixed rotations at their prescribed values, quaternions normalised."""
         q, y, lam, unwrapped = self.parts
@@ -353,11 +283,6 @@ class Program:
         _, (q, y, lam, unwrapped) = self._symbols
         return Stationarity(self.expressions, q, y, lam, self.given, unwrapped, entries=entries)
 
-    def _matrix(self, entries: list[ca.MX]) -> ca.MX:
-        """The Newton matrix (total, total) with its whole diagonal, for regularisation and shifts."""
-        tables = self.expressions.tables
-        return summed((self.expressions.total,) * 2, tables.whole, ca.vertcat(*entries, ca.MX(1), ca.MX(0)))
-
     @functools.cached_property
     def potential(self) -> ca.MX:
         """Potential energy over ``model.scales.moment``, zero for the undeformed, unloaded scene.
@@ -366,121 +291,28 @@ class Program:
         """
         return self._energies[0] - ca.dot(self.given.force, self._places)
 
-    @functools.cached_property
-    def _gaps(self) -> ca.MX:
-        return self.expressions.gaps_of(self._arguments, self.parts[1], self.given)
-
-    @functools.cached_property
-    def at(self) -> ca.Function:
-        """(state, given) -> residual (total,), relative residual, potential, sum of gaps, entries of the matrix."""
-        state, _ = self._symbols
-        residual = ca.densify(self.stationarity.residual)
-        # The maximum may ignore nan; adding zero times the sum keeps it.
-        shares = residual / ca.fmax(self.scale, LEAST_SCALE)
-        size = ca.norm_inf(shares) + 0.0 * ca.sum1(residual) if self.expressions.total else ca.MX(0)
-        results = {
-            "residual": residual,
-            "size": size,
-            "potential": self.potential,
-            "gaps": self._sum_of_gaps(ca.vertsplit(residual, [0, self.equations.unknowns, self.expressions.total])[1]),
-            "entries": self.matrix.nz[:],
-        }
-        return self._function("at", {"state": state, "given": self.symbol}, results)
-
-    @functools.cached_property
-    def merit(self) -> ca.Function:
-        """(state, given) -> potential and sum of the absolute gaps, the parts of a merit function."""
-        state, _ = self._symbols
-        results = {"potential": self.potential, "gaps": self._sum_of_gaps(self._gaps)}
-        return self._function("merit", {"state": state, "given": self.symbol}, results)
-
-    def _sum_of_gaps(self, gaps: ca.MX) -> ca.MX:
-        return ca.norm_1(gaps) if self.equations.rows else ca.MX(0)
-
     @property
     def slice_of_loads(self) -> slice:
         """Positions of loads and motions in what is given: after all data."""
         data = sum(size for name, size in self.sizes.items() if is_data(name))
         return slice(data, self.symbol.shape[0])
 
-    @property
-    def slice_of_moments(self) -> slice:
-        """Positions of moments in what is given; empty if there are none."""
-        couples = [f"loads_{i}" for i, group in enumerate(self.model.connections) if group.kind.is_couple]
-        bounds = np.cumsum([0, *self.sizes.values()]).tolist()
-        found = [i for i, name in enumerate(self.sizes) if name in couples]
-        return slice(bounds[found[0]], bounds[found[-1] + 1]) if found else slice(0, 0)
+    # -- rows of inputs -----------------------------------------------------------------------------
 
     @functools.cached_property
-    def convex(self) -> ca.Function:
-        """(state, given) -> entries of the matrix with positive semidefinite matrices of the elements."""
-        expressions, model = self.expressions, self.model
-        state, entries = self._symbols[0], list(self.stationarity.entries)
-        if expressions.elements:
-            function = expressions.many(model.element.convex, expressions.elements)
-            entries[0] = ca.vec(function(*self._arguments[0], expressions.multipliers(0, self.parts[2])))
-        matrix = self._matrix(entries).nz[:]
-        return self._function("convex", {"state": state, "given": self.symbol}, {"entries": matrix})
+    def varying(self) -> list[int]:
+        """Numbers of the groups of terms whose data are part of what is given."""
+        names = [ELEMENT_DATA, *((f"data_{i}",) for i in range(len(self.model.connections)))]
+        return [i for i, own in enumerate(names) if any(name in self.sizes for name in own)]
 
     @functools.cached_property
-    def sparsity(self) -> ca.Sparsity:
-        """Pattern of the Newton matrix, (total, total)."""
-        row, column, _, _ = self.expressions.tables.whole
-        cells = np.unique(column * self.expressions.total + row)
-        return pattern(self.expressions.total, cells % self.expressions.total, cells // self.expressions.total)
-
-    @functools.cached_property
-    def left(self) -> ca.Function:
-        """(entries, x, b) -> b - matrix x, the residual (total,) of a linear system."""
-        n = self.expressions.total
-        entries, x, b = ca.MX.sym("entries", self.sparsity.nnz()), ca.MX.sym("x", n), ca.MX.sym("b", n)
-        rest = b - ca.mtimes(ca.MX(self.sparsity, entries), x)
-        return self._function("left", {"entries": entries, "x": x, "b": b}, {"left": ca.densify(rest)})
-
-    @functools.cached_property
-    def linear(self) -> ca.Function:
-        """(entries, b) -> the solution (total,) of the linear system, which need not be symmetric."""
-        entries, b = ca.MX.sym("entries", self.sparsity.nnz()), ca.MX.sym("b", self.expressions.total)
-        x = ca.solve(ca.MX(self.sparsity, entries), b, "qr", {"eps": 1e-300})
-        return self._function("linear", {"entries": entries, "b": b}, {"x": ca.densify(x)})
-
-    @functools.cached_property
-    def scale(self) -> ca.MX:
-        """Scale (total,) of each residual for its rounding, see :class:`~sfetcas.mechanics.equations.Point`."""
-        expressions, model, equations = self.expressions, self.model, self.equations
-        found = self.stationarity
-        _, (_, _, lam, _) = self._symbols
-        total = ca.MX(equations.noise)
-        for number, (sides, values) in enumerate(found.shares):
-            sizes = ca.fabs(values)
-            if number == 0 and expressions.elements:
-                # The magnitude of internal forces along an element, beside the moments on its nodes.
-                pull = ca.reshape(ca.fabs(found.pull), expressions.axes * expressions.points, expressions.elements)
-                weights = ca.DM(np.repeat(model.beams.weight, expressions.axes, axis=1).T)
-                sizes += ca.repmat(ca.sum1(pull * weights), sides.shape[1], 1)
-            total += times(expressions.sizes_onto_unknowns(sides), ca.vec(sizes))
-        if equations.displacement_unknowns:
-            closings = len(model.positions.rows)
-            acting = times(model.positions.W.T.absolute, ca.fabs(lam[:closings, :]))
-            acting += times(model.positions.Y.T.absolute, ca.fabs(found.on_places))
-            acting += UNLOADED * ca.norm_inf(acting) + 1e-12
-            rotation_unknowns = equations.rotation_unknowns
-            total += ca.vertcat(ca.MX.zeros(rotation_unknowns), acting, ca.MX.zeros(equations.rows))
-            retained = equations.place_number[(model.positions.retained >= 0).all(axis=1)]
-            if len(retained):
-                flat = ca.reshape(total[retained.ravel().tolist()], expressions.axes, len(retained))
-                largest = functools.reduce(ca.fmax, ca.vertsplit(flat))
-                spread = ca.vec(ca.repmat(largest, expressions.axes, 1))
-                onto = sparse(
-                    retained.ravel(),
-                    np.arange(retained.size),
-                    np.ones(retained.size),
-                    (expressions.total, retained.size),
-                )
-                others = np.ones(expressions.total)
-                others[retained.ravel()] = 0.0
-                total = total * ca.DM(others) + ca.densify(ca.mtimes(onto, spread))
-        return total
+    def row(self) -> ca.Function:
+        """(given) -> the row of :class:`~sfetcas.mechanics.inputs.Inputs` with the data that vary."""
+        inputs, angles = Inputs(self.equations, self.varying), ca.MX(0, 1)
+        if self.expressions.layout.unwrapped:
+            angles = self._prescribed_unwrapped(self._prescribed())
+        row = inputs.expression(self.expressions, self.given, angles)
+        return self._function("row", {"given": self.symbol}, {"row": row})
 
 
 def data_of(model: Model) -> dict[str, Array]:
@@ -492,39 +324,3 @@ def data_of(model: Model) -> dict[str, Array]:
 def is_data(name: str) -> bool:
     """Whether the name of a part of what is given is that of data, not of loads or motions."""
     return name in ELEMENT_DATA or name.startswith("data_")
-
-
-class _Systems:
-    """Linear systems by CasADi's functions, as generated C has them."""
-
-    def __init__(self, program: Program, shifts: Shifts, *, factors: bool, pivoted: bool) -> None:
-        self._program, self._pivoted = program, pivoted
-        entries, firm, share = ca.MX.sym("entries", program.sparsity.nnz()), ca.MX.sym("firm"), ca.MX.sym("soft")
-        diagonal = shifts.diagonal.tolist()
-        target = ca.MX(entries)
-        target[diagonal] = target[diagonal] + (shifts.proximal + firm) * ca.DM(shifts.mass)
-        soft = ca.MX(target)
-        soft[diagonal] = soft[diagonal] + share * ca.DM(shifts.soft)
-        results = [target, ca.MX(program.sparsity, soft)]
-        self._shifted = ca.Function("firmness", [entries, firm, share], results)
-        if factors:
-            self._solver = ca.Linsol("globalised", "ldl", program.sparsity)
-            self._solver.sfact(ca.DM(program.sparsity, 1.0))
-
-    def shift(self, entries: ca.DM, firm: float, share: float) -> None:
-        self._target, self._matrix = self._shifted(entries, firm, share)
-
-    def negative(self) -> int | None:
-        try:
-            self._solver.nfact(self._matrix)
-        except RuntimeError:
-            return None
-        return int(self._solver.neig(self._matrix))
-
-    def backward(self, b: Array) -> Array:
-        if self._pivoted:
-            return np.array(self._program.linear(self._matrix.nz[:], b)).ravel()
-        return np.array(self._solver.solve(self._matrix, b)).ravel()
-
-    def left(self, x: Array, b: Array) -> Array:
-        return np.array(self._program.left(self._target, x, b)).ravel()

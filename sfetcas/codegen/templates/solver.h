@@ -33,11 +33,8 @@ typedef struct {
   double *res[@sz_res@];
   int iw[@sz_iw@];
   double w[@sz_w@];
-  double given[@sz_given@], shared[@sz_given@];
-  double states[2][@sz_state@], reached[@sz_state@], kept[@sz_state@];
-  double residuals[2][@sz_total@], b[@sz_total@], x[@sz_total@], y[@sz_total@], rest[@sz_total@], step[@sz_total@];
-  double matrices[2][@sz_entries@], positive[@sz_entries@], target[@sz_entries@], matrix[@sz_entries@];
-  double lower[@sz_lower@], pivots[@sz_total@];@margins_declared@
+  double given[@sz_given@], numbers[@sz_numbers@];@margins_declared@
+  int whole[@sz_whole@];
 } @name@_memory;
 
 typedef struct {

@@ -1,0 +1,239 @@
+"""The core as part of generated C: its sources, and the tables of a model."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..core.building import SOURCES
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from ..mathematics.core import TapeTable
+from ..mathematics.linear import factor_tables, last_rows, pivot_order
+from ..mathematics.source import table
+from ..mechanics.evaluation import Handed, handed
+from ..parametric.equilibrium import EquilibriumSolver
+from .rendering import optimised
+
+__all__ = ["SolverTables", "core_in_c"]
+
+PARTS = (("O3", ("core.h", "tape.c")), ("no-ivopts", ("states.c", "equations.c", "factors.c", "afar.c")))
+"""What generated C needs of the core, in the order in which ``core.c`` has it, and how GCC is to optimise it.
+
+Most of the time goes into tapes, which need all that it can; what else it tries takes half of the time to compile.
+"""
+
+
+@functools.cache
+def core_in_c() -> list[str]:
+    """The sources of the core that a solver takes, as static C without comments."""
+    done = set[str]()
+    return [optimised(level, _plain("\n".join(_included(name, done) for name in names))) for level, names in PARTS]
+
+
+def _plain(text: str) -> str:
+    text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    # What a library has for others, and what of it is made elsewhere.
+    text = re.sub(r"^SF_PUBLIC [^;]*;\n", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^(int|double) (sf_\w+\()", r"static \1 \2", text, flags=re.MULTILINE)
+    return "\n".join(filter(None, map(str.rstrip, text.splitlines()))) + "\n"
+
+
+def _included(name: str, done: set[str]) -> str:
+    """A file with those of the core that it includes in their place; headers once."""
+    if name in done and name != "lanes.h":
+        return ""
+    done.add(name)
+    text = (SOURCES / name).read_text(encoding="utf-8")
+    return re.sub(r'#include "([\w.]+)"', lambda match: _included(match[1], done), text)
+
+
+class InC:
+    """Structures of the core as initialisers in C, and the constant arrays that they point to.
+
+    Parameters
+    ----------
+    arrays : mapping
+        What the structures point to, by addresses.
+
+    Attributes
+    ----------
+    tables : list of str
+        Definitions of the arrays, in the order in which they were met.
+    """
+
+    def __init__(self, arrays: Mapping[int, Any]) -> None:
+        self._arrays, self.tables = arrays, list[str]()
+        self._names, self._known = dict[int, str](), dict[tuple[str, bytes], str]()
+
+    def value(self, structure: ctypes.Structure, **own: str) -> str:
+        """The initialiser of a structure, with values of some of its fields as they are given, in C."""
+        parts = []
+        for name, kind, *_ in structure._fields_:
+            value = getattr(structure, name)
+            if name in own:
+                parts.append(own[name])
+            elif isinstance(value, ctypes.Structure):
+                parts.append(self.value(value))
+            elif kind is ctypes.c_void_p:
+                parts.append(self.pointer(value) if value else "0")
+            else:
+                parts.append(repr(value) if np.isfinite(value) else "HUGE_VAL")
+        return f"{{{', '.join(parts)}}}"
+
+    def pointer(self, address: int) -> str:
+        """What is at an address, by its name."""
+        if address not in self._names:
+            what = self._arrays[address]
+            self._names[address] = self.tape(what) if isinstance(what, TapeTable) else self.array(what)
+        return self._names[address]
+
+    def array(self, values: Array) -> str:
+        """The name of a constant array; equal ones are one."""
+        kind = "double" if values.dtype.kind == "f" else "int"
+        key = (kind, values.tobytes())
+        if key not in self._known:
+            self._known[key] = f"sf_t{len(self._known)}"
+            self.tables.append(table(self._known[key], values, kind))
+        return self._known[key]
+
+    def tape(self, tape: TapeTable) -> str:
+        """The name of a tape."""
+        name = f"&sf_tape_{len(self.tables)}"
+        stretch, code = (self._pairs(self._arrays[address]) for address in (tape.stretch, tape.code))
+        inner = self.value(tape, stretch=stretch, code=code)
+        self.tables.append(f"static const sf_tape {name[1:]} = {inner};\n")
+        return name
+
+    def _pairs(self, rows: Array) -> str:
+        """The name of an array of operations or stretches."""
+        kind = "sf_stretch" if rows.shape[1] == 2 else "sf_operation"
+        key = (kind, rows.tobytes())
+        if key not in self._known:
+            self._known[key] = f"sf_t{len(self._known)}"
+            # There are tens of thousands: without spaces.
+            lines = (",".join(map(str, part.ravel().tolist())) for part in np.split(rows, range(8, len(rows), 8)))
+            inner = ",\n".join(lines) or "0"
+            self.tables.append(f"static const {kind} {self._known[key]}[{max(len(rows), 1)}] = {{\n{inner}\n}};\n")
+        return self._known[key]
+
+
+class SolverTables:
+    """What the core takes of an equilibrium solver: definitions in C, sizes, and how much memory a solve takes.
+
+    Parameters
+    ----------
+    solver : EquilibriumSolver
+
+    Attributes
+    ----------
+    constants : dict
+        Sizes by their names in the driver.
+    texts : list of str
+        Definitions of structures and tables.
+    sizes : dict
+        What the core says of its memory: ``sf_work_size``, ``sf_find_size``.
+    numbers, whole : int
+        Doubles and whole numbers of the memory of a solve.
+    """
+
+    def __init__(self, solver: EquilibriumSolver) -> None:
+        method, inputs = solver.method, solver.method.inputs
+        equations, model = method.equations, solver.model
+        known = handed(equations.layout, model, equations.noise)
+        if known is None or not known.layout.searchable:
+            raise SceneError("found a kind of member that the core in C does not know, accepted: to solve in Python")
+        rules, given, arrays = method.for_core()
+        points = known.arrays | {array.ctypes.data: array for array in arrays}
+        structure, convex, varying = known.structure, known.layout.convex, inputs.varying
+        if convex is not None:
+            rules.convex, rules.stiffness = ctypes.addressof(convex[0]), known.layout.tapes[0].parts[4]
+            points |= {rules.convex: convex[0], **{array.ctypes.data: array for array in convex[1]}}
+        given.groups = len(varying)
+        text, n = InC(points), structure.total
+        groups = [
+            text.value(group, **({"datum": "0"} if number in varying else {}))
+            for number, group in enumerate(known.groups)
+        ]
+        structures = {
+            "sf_model sf_the_model": text.value(structure, group="0"),
+            "sf_rules sf_the_rules": text.value(rules),
+            "sf_inputs sf_the_inputs": text.value(given, count="0", datum="0"),
+        }
+        factors = factor_tables(n, equations.row, equations.column)
+        room, order = 0, pivot_order(n, equations.row, equations.column, last_rows(equations.rows))
+        if method.pivoted and n:
+            # Those of orthogonal factors hold them, whatever the pivots are: George and Ng 1985.
+            columns = np.argsort(order)[equations.column].tolist()
+            whole = ca.Sparsity.triplet(n, n, equations.row.tolist(), columns)
+            room = n + max(part.nnz() for part in whole.qr_sparse(False)[:2])
+        sizes = [model.terms[number].data.size for number in varying]
+        self.texts = [
+            *text.tables,
+            f"static const sf_group sf_groups[] = {{\n  {(',' + chr(10) + '  ').join(groups)}\n}};\n",
+            *(f"static const {name} = {value};\n" for name, value in structures.items()),
+            *(
+                table(name, values, "int")
+                for name, values in zip(
+                    ("sf_start_of_columns", "sf_rows", "sf_order", "sf_place_in_order", "sf_varying", "sf_counts"),
+                    (*factors, np.array(varying), np.array(sizes)),
+                    strict=True,
+                )
+            ),
+            *([table("sf_order_with_pivots", order, "int")] if room else []),
+            table("sf_start", solver.start if solver.start is not None else np.zeros(0)),
+        ]
+        count, below = method.states, _filled(n, factors)
+        self.constants = {
+            "TOTAL": n,
+            "STATE": count,
+            "STARTED": int(solver.start is not None),
+            "GROUPS": len(groups),
+            "VARYING": len(varying),
+            "INPUTS": inputs.size,
+            "FILLED": below,
+            "ROOM": room,
+        }
+        self.sizes = {"work": _work_size(known), "find": _find_size(known, convex, inputs.size, count)}
+        elements = structure.elements * structure.points * structure.axes
+        of_point = structure.results + structure.places * structure.axes + elements + self.sizes["work"]
+        self.numbers = sum(sizes) + inputs.size + count + of_point + below + 2 * n
+        self.numbers += (2 * room + 2 * n) * bool(room) + self.sizes["find"]
+        self.whole = 5 * n + 1 + below + (2 * room + 8 * n + 2) * bool(room)
+
+
+def _filled(n: int, factors: list[Array]) -> int:
+    """Entries of the factors without pivoting below the diagonal, see ``sf_count``."""
+    start, rows, order, place = (part.tolist() for part in factors)
+    parent, mark, found = [-1] * n, [-1] * n, 0
+    for k in range(n):
+        mark[k] = k
+        for p in range(start[order[k]], start[order[k] + 1]):
+            i = place[rows[p]]
+            while i < k and mark[i] != k:
+                parent[i] = k if parent[i] < 0 else parent[i]
+                found += 1
+                mark[i], i = k, parent[i]
+    return found
+
+
+def _work_size(known: Handed) -> int:
+    """What ``sf_work_size`` says."""
+    structure, tapes = known.structure, known.layout.tables
+    arguments, slots = (max((getattr(tape, name) for tape in tapes), default=0) for name in ("arguments", "slots"))
+    found = 2 * structure.segments * structure.axes + max(structure.elements, structure.closings)
+    return found + structure.displacements + structure.places * structure.axes + 8 * (arguments + slots)
+
+
+def _find_size(known: Handed, convex: tuple[TapeTable, list[Array]] | None, inputs: int, states: int) -> int:
+    """What ``sf_find_size`` says."""
+    structure = known.structure
+    found = 2 * (states + 2 * structure.total + structure.entry_count) + 3 * structure.entry_count
+    of_convex = 0 if convex is None else 8 * (convex[0].results + convex[0].slots)
+    return found + 6 * structure.total + of_convex + inputs + 2 * states
