@@ -259,8 +259,11 @@ def test_default_arguments():
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("generated") / "c"
-    export(beam(), place, name="strip", results=["nodes.B.position", "reactions.A.moment"], sensitivities=True)
+    export(beam(), place, **STRIP)
     return place
+
+
+STRIP = {"name": "strip", "results": ["nodes.B.position", "reactions.A.moment"], "sensitivities": True}
 
 
 def test_files_stand_alone(folder):
@@ -386,9 +389,35 @@ def test_loader_needs_neither_sfetcas_nor_numpy(folder):
     assert (status, sooner, bad) == ("0", "True", "None")
     wanted = solve(Scene.from_dict(cantilever(value=[0.15, 2.0]))).last.position("B")
     assert [float(x) for x in position] == pytest.approx(wanted, abs=2e-4)
+    text = "import strip\na = strip.Solver().solve()\nprint(repr(a['error']), repr(a['residual']), a['negative'])"
+    run = subprocess.run([sys.executable, "-c", text], cwd=folder, capture_output=True, text=True, check=True)
+    error, residual, negative = map(float, run.stdout.split())
+    outcome, _ = equilibrium_solver(beam(), "strip", results=STRIP["results"]).solve()
+    assert (error, residual, negative) == (outcome.error, outcome.residual, outcome.negative)
     wrong = "import strip; strip.Solver().solve({'loads.tip.value': [1.0]})"
     run = subprocess.run([sys.executable, "-c", wrong], cwd=folder, capture_output=True, text=True, check=False)
     assert "loads.tip.value: found 1 numbers, accepted: 2" in run.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "factors"), [("cantilever_tip_force", (2.0, 5.0, 10.0)), ("bend_45_degrees", (200.0, 600.0, 1800.0))]
+)
+def test_error_in_the_report_is_about_that_of_positions(name, factors):
+    """On a mesh that becomes too coarse as loads grow: never much below the error, and of its size."""
+    scene = load(PROBLEMS / f"{name}.toml")
+    coarse, fine = (
+        equilibrium_solver(scene, "c", arguments=["factor"], results=["nodes.tip.position"], settings=settings)
+        for settings in (Settings(elements=2), Settings(elements=16))
+    )
+    errors = []
+    for factor in factors:
+        (outcome, here), (_, there) = coarse.solve([factor]), fine.solve([factor])
+        error = np.linalg.norm(here - there) / scene.size
+        assert error <= 2.0 * outcome.error
+        assert outcome.error <= 30.0 * error
+        errors.append(outcome.error)
+    assert errors == sorted(errors)
+    assert errors[-1] > 100.0 * errors[0]
 
 
 @needs_compiler

@@ -38,7 +38,7 @@ class EquilibriumWriter(Writer):
     def functions(self) -> list[ca.Function]:
         """The functions of the solver, and those that compute the results."""
         solver, program = self.solver, self.arguments.program
-        found = [solver.prepare, solver.output, program.row]
+        found = [solver.prepare, solver.output, program.row, solver.error]
         if solver.margins is not None:
             found.append(solver.margins)
         return [*found, solver.sensitivities] if self._sensitivities else found

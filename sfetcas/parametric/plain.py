@@ -24,7 +24,6 @@ from ..description.scene import Scene
 from ..equilibria.refinement import DRIFT, TORN
 from ..equilibria.settings import Settings
 from ..errors import SceneError
-from ..mathematics import interpolation
 from ..mathematics.arrays import Array, Index
 from ..mathematics.constants import sparse
 from ..mathematics.core import Cases, doubles, integers
@@ -457,28 +456,7 @@ class _Level:
             inside = sparse(rows, columns, at.gained.ravel(), (count * n, len(at.xi)))
             found.append(begin[:, at.elements.tolist()] + ca.mtimes(own, inside))
         shown = ca.vec(ca.horzcat(*found)) * model.scales.length
-        return self._told_by(ca.vertcat(shown, self._roughness()))
-
-    def _roughness(self) -> ca.MX:
-        """Largest of :func:`~sfetcas.mechanics.accuracy.roughness`."""
-        program, expressions, model = self.arguments.program, self.arguments.expressions, self.model
-        element = model.element
-        if not expressions.elements:
-            return ca.MX(0)
-        q, y, _, _ = program.parts
-        turns = model.rotations.turns
-        tail = ca.DM(interpolation.legendre_tail(element.nodes))
-        width = q.shape[0]
-        by_element = ca.reshape(q[:, turns.ravel().tolist()], width * turns.shape[1], len(turns))
-        mixing = ca.kron(tail.T, ca.DM.eye(width))
-        angles = ca.sqrt(ca.sum1(ca.mtimes(mixing, by_element) ** 2))
-        tangents = expressions.tangents(q, expressions.retained_places(y, program.given), program.given)
-        points = ca.DM(interpolation.legendre_tail(element.points) / element.weights)
-        axes = expressions.axes
-        by_element = ca.reshape(tangents, axes * expressions.points, len(turns))
-        chord = ca.sqrt(ca.sum1(ca.mtimes(ca.kron(points.T, ca.DM.eye(axes)), by_element) ** 2))
-        chord = chord * (model.scales.length / model.scene.size)
-        return ca.mmax((2.0 if model.space else 1.0) * angles + chord)
+        return self._told_by(ca.vertcat(shown, program.roughness))
 
     # -- solving --------------------------------------------------------------------------------------
 

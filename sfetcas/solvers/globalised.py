@@ -165,6 +165,9 @@ class Outcome:
     iterations : int
     places : ndarray (ends,)
         Where elements end beside the ends of lines that move with the numbers, if there are any.
+    error : float
+        What a parametric solver says of the error of positions, see
+        :attr:`~sfetcas.parametric.equilibrium.EquilibriumSolver.error`; else nan.
     """
 
     code: Code
@@ -173,6 +176,7 @@ class Outcome:
     negative: int
     iterations: int
     places: Array = field(default_factory=lambda: np.zeros(0))
+    error: float = np.nan
 
 
 @dataclass(frozen=True)

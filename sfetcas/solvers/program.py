@@ -17,6 +17,7 @@ import numpy as np
 from ..mathematics.active import applied
 from ..mathematics.arrays import Array, numbers
 from ..mathematics.constants import sparse, times
+from ..mathematics.interpolation import legendre_tail
 from ..mechanics.beams import ELEMENT_DATA
 from ..mechanics.expressions import LOADS, Expressions, Given, moved_by
 from ..mechanics.inputs import Inputs
@@ -174,6 +175,24 @@ class Program:
     def strain(self) -> ca.MX:
         """Elastic energy of all terms, over ``model.scales.moment``."""
         return self._energies[1]
+
+    @functools.cached_property
+    def roughness(self) -> ca.MX:
+        """Largest of :func:`~sfetcas.mechanics.accuracy.roughness`, without that of twisted tubes."""
+        expressions, element = self.expressions, self.model.element
+        if not expressions.elements:
+            return ca.MX(0)
+        q, turns = self.parts[0], self.model.rotations.turns
+        tail = ca.DM(legendre_tail(element.nodes))
+        width = q.shape[0]
+        by_element = ca.reshape(q[:, turns.ravel().tolist()], width * turns.shape[1], len(turns))
+        angles = ca.sqrt(ca.sum1(ca.mtimes(ca.kron(tail.T, ca.DM.eye(width)), by_element) ** 2))
+        points, axes = ca.DM(legendre_tail(element.points) / element.weights), expressions.axes
+        tangents = expressions.tangents(q, self._places, self.given)
+        by_element = ca.reshape(tangents, axes * expressions.points, len(turns))
+        chord = ca.sqrt(ca.sum1(ca.mtimes(ca.kron(points.T, ca.DM.eye(axes)), by_element) ** 2))
+        chord = chord * (self.model.scales.length / self.model.scene.size)
+        return ca.mmax((2.0 if self.model.space else 1.0) * angles + chord)
 
     def _function(self, name: str, arguments: Mapping[str, ca.MX], results: Mapping[str, ca.MX]) -> ca.Function:
         return ca.Function(

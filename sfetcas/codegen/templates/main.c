@@ -21,7 +21,8 @@ int main(int count, char **texts) {
       return 2;
     }
   @name@_solve(&memory, p, state, 0, found, &report);
-  printf("%s; %d iterations, residual %.1e\n", @name@_message(report.status), report.iterations, report.residual);
+  printf("%s; %d iterations, residual %.1e, error about %.0e\n", @name@_message(report.status), report.iterations,
+         report.residual, report.error);
   if (report.status != @NAME@_SOLVED && report.status != @NAME@_UNSTABLE) return 3;
   for (one = results; one->name; ++one) {
     printf("%s [%s]:", one->name, one->unit);

@@ -47,6 +47,7 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
   sf_system system;
   sf_point point;
   sf_sought sought;
+  double error = NAN;
   for (i = 0; i < SF_GROUPS; ++i) groups[i] = sf_groups[i];
   model.group = groups;
   for (i = 0; i < SF_VARYING; ++i) {
@@ -124,6 +125,8 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
   }
 #endif
   if (report) {
+    if (status <= @NAME@_UNSTABLE) sf_call(m, @name@_error, own, m->given, 0, &error);
+    report->error = error;
     report->status = status;
     report->iterations = sought.iterations;
     report->negative = status <= @NAME@_UNSTABLE ? sought.negative : SF_NOT_DEFINED;

@@ -42,6 +42,7 @@ typedef struct {
   int iterations;  /* of Newton's method */
   int negative;    /* ways out of an unstable equilibrium, 0 of a stable one, -1 where no energy tells */
   double residual; /* of the equilibrium, relative to what is added up in it */
+  double error;    /* of positions over the size of the structure, about; grows where the mesh is too coarse */
 } @name@_report;
 
 /* The values that the arguments have in the scene. */
