@@ -21,10 +21,11 @@ from sfetcas.mathematics import core as c
 from sfetcas.mathematics import linear, tapes
 from sfetcas.mathematics.linear import CoreSystem, InertiaSolver, SparseSolver
 from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.inputs import Inputs
 from sfetcas.mechanics.mesh import first_mesh
 from sfetcas.mechanics.terms import rotation_gradient
 from sfetcas.solvers import continuation, newton
-from sfetcas.solvers.globalised import Globalised
+from sfetcas.solvers.globalised import Code, Globalised, Rules
 from sfetcas.solvers.prepared import Prepared
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
@@ -215,6 +216,58 @@ def test_newton_from_afar_takes_the_decisions_of_python(name, monkeypatch):
     assert all(found is not None for found in sought)
 
 
+@pytest.mark.parametrize("name", EVERYTHING)
+def test_rows_are_solved_as_in_python(name, monkeypatch):
+    """Cold, from an equilibrium for other loads, and on the way from one: codes, eigenvalues and states."""
+    model = model_of(EVERYTHING[name](), 1, 3)
+    prepared = Prepared(model)
+    inputs = Inputs(prepared.equations)
+    rows = [inputs.of(model.loading(factor)) for factor in (0.3, 1.0)]
+    method = Globalised(inputs, prepared.weight, Rules(escapes=0))
+    cold = [both(method, row) for row in rows]
+    if Code.SOLVED not in {found.code for found in cold[:1]}:
+        return
+    both(method, rows[1], cold[0].state, warm=True)
+    assert both(method, rows[0], cold[0].state, warm=True).iterations <= 3
+    # Where whole steps are too long what is given becomes another little by little.
+    counted = Counted(Globalised._followed)
+    monkeypatch.setattr(Globalised, "_followed", counted)
+    monkeypatch.setattr(type(model), "downhill", property(lambda _: False))
+    rules = Rules(escapes=0, far=FAR.get(name, 0.1), near=0.01)
+    way = Globalised(inputs, prepared.weight, rules, begun=(rows[0], cold[0].state))
+    found = both(way, rows[1], cold[0].state, warm=True)
+    assert counted.calls
+    assert found.code is Code.SOLVED
+
+
+FAR = {"tripod": 0.02}
+"""Longest step of each scene, rad, with which it does not get there at once; by default a tenth."""
+
+
+class Counted:
+    """A method that counts how often it is called."""
+
+    def __init__(self, method):
+        self.calls, self._method = 0, method
+
+    def __get__(self, one, _):
+        def called(*given):
+            self.calls += 1
+            return self._method(one, *given)
+
+        return called
+
+
+def both(method, row, start=None, *, warm=False):
+    mine, other = method(row, start, warm=warm), method._step_by_step(row, start, warm=warm)
+    assert mine.code == other.code
+    assert abs(mine.iterations - other.iterations) <= 2
+    if mine.code in (Code.SOLVED, Code.UNSTABLE):
+        assert mine.negative == other.negative
+        alike(mine.state, other.state, 1e-8)
+    return mine
+
+
 FOLLOWED = {
     "cantilever_tip_force": True,
     "portal_frame": True,
@@ -330,6 +383,18 @@ def test_a_term_has_the_same_bits_in_any_lane(library, count):
     for i in range(count):
         for mine, other in zip(run(library, function, [part[i : i + 1] for part in given]), whole, strict=True):
             np.testing.assert_array_equal(mine[0], other[i])
+
+
+@pytest.mark.parametrize("name", ["SFET5", "SFET3"])
+def test_operations_of_a_kind_stand_together(library, name):
+    """In few stretches, and in hardly more memory than in the order of CasADi."""
+    tape = tapes.tape_of(rotation_gradient(sfetcas.mechanics.elements.element_by_name(name, True)))
+    table, (stretch, code, _) = c.table_of(tape)
+    assert stretch[:, 1].sum() == len(tape.code) == len(code)
+    assert len(stretch) == table.stretches < len(tape.code) / 20
+    assert table.slots < 1.5 * tape.slots
+    kinds, counts = np.unique(tape.code[:, 0], return_counts=True)
+    assert [stretch[stretch[:, 0] == kind, 1].sum() for kind in kinds] == counts.tolist()
 
 
 def test_functions_with_other_operations_have_no_tape():

@@ -8,6 +8,8 @@ from sfetcas import SolveError, solve, solve_model
 from sfetcas.mathematics import quaternion as quat
 from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.model import assemble
+from sfetcas.parametric.equilibrium import equilibrium_solver
+from sfetcas.solvers.globalised import Code, Globalised
 
 TILT = quat.from_rotation_vector([0.4, -0.7, 0.2])
 
@@ -91,6 +93,20 @@ def test_mechanism_in_space_winds_its_springs_as_in_the_plane(drive, moment):
     else:
         assert plane.spring("joint").travel == pytest.approx(drive, rel=1e-12)
     assert space.energy["elastic"] == pytest.approx(plane.energy["elastic"], rel=1e-9)
+
+
+@pytest.mark.parametrize("by_core", [True, False])
+def test_a_warm_solve_counts_the_turns_that_a_drive_makes(by_core, monkeypatch):
+    """From one equilibrium to another by a turn and more, at once: the drive says where the angle is."""
+    if not by_core:
+        monkeypatch.setattr(Globalised, "_by_core", lambda *_, **__: None)
+    solver = equilibrium_solver(made(arms("space", drive=1.0)), "c", arguments=["motions.drive.rotation"])
+    first, results = solver.solve([1.0])
+    assert float(solver.by_name(results)["springs.joint.angle"]) == pytest.approx(1.0, rel=1e-12)
+    for drive in (8.0, -20.0):
+        outcome, results = solver.solve([drive], start=first.state)
+        assert outcome.code is Code.SOLVED
+        assert float(solver.by_name(results)["springs.joint.angle"]) == pytest.approx(drive, rel=1e-12)
 
 
 def test_forces_wind_a_spring_through_a_string_of_torsion():

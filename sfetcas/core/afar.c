@@ -93,6 +93,32 @@ static void sf_swap(sf_run_of *run) {
   run->there = here;
 }
 
+/* Angles near which turns are counted, as the row that was taken prescribes them; all of them for the undeformed state. */
+static void sf_hold_angles(const sf_run_of *run, int all, sf_state *state) {
+  const double *angle = run->given + run->m->given + 3 * run->inputs->turning;
+  int i;
+  for (i = 0; i < run->m->angles; ++i)
+    if (all || run->inputs->held[i]) state->unwrapped[i] = angle[i];
+}
+
+/* From here to there by a share of the step. */
+static void sf_go(sf_run_of *run, double share) {
+  sf_move(run->m, &run->here->state, run->step, share, &run->there->state);
+  /* However far a step turns what is driven, it is the drive that says how often. */
+  sf_hold_angles(run, 0, &run->there->state);
+}
+
+/* How it ended at an equilibrium: in none where what is driven stands by whole turns from where its drive says. */
+static int sf_ended(const sf_run_of *run) {
+  const sf_state *state = &run->here->state;
+  int i;
+  for (i = 0; i < run->m->angles; ++i)
+    if (run->inputs->held[i] &&
+        !(fabs(sf_counted(run->m, i, state->q, state->unwrapped[i]) - state->unwrapped[i]) <= run->rules->miscounted))
+      return SF_STALLED;
+  return SF_SOLVED;
+}
+
 static double sf_length(const sf_run_of *run, const double *step) { return sf_largest(step, run->m->rotation_unknowns); }
 
 /* Factors of a matrix made firmer; the number of its negative pivots, less that of rows and of places that slide. */
@@ -219,7 +245,7 @@ static int sf_shortened(sf_run_of *run, double *scale) {
   before = run->here->point.potential + penalty * run->here->gaps;
   for (halving = 0; halving < rules->halvings; ++halving) {
     double wanted;
-    sf_move(m, &run->here->state, run->step, *scale, &run->there->state);
+    sf_go(run, *scale);
     sf_look(run, run->there);
     wanted = rules->armijo * (*scale - 0.5 * (*scale * *scale)) * slope;
     if (run->there->point.potential + penalty * run->there->gaps - before <= wanted + rules->noise * fabs(before)) {
@@ -242,16 +268,16 @@ static int sf_descended(sf_run_of *run, int *negative) {
     --run->left;
     if (!sf_is_finite(run->here->size)) return SF_NOT_FINITE;
     found = sf_newton(run, negative);
-    if (!first && run->here->size <= rules->rounding) return SF_SOLVED;
+    if (!first && run->here->size <= rules->rounding) return sf_ended(run);
     first = 0;
     if (found && sf_length(run, run->step) < rules->near) {
       /* Near an equilibrium, stable or not, Newton's own step leads to it. */
-      sf_move(run->m, &run->here->state, run->step, 1.0, &run->there->state);
+      sf_go(run, 1.0);
       sf_look(run, run->there);
       if (run->here->size <= rules->converged && !(run->there->size <= rules->gain * run->here->size)) {
         if (run->there->size < run->here->size) sf_swap(run);
         *negative = sf_firm(run, run->here->point.entries, 0.0);
-        return SF_SOLVED;
+        return sf_ended(run);
       }
       if (run->there->size < run->here->size || *negative == 0) {
         sf_swap(run);
@@ -294,15 +320,15 @@ static void sf_nudged(sf_run_of *run) {
   }
   length = sf_length(run, run->step);
   for (i = 0; i < m->total; ++i) run->step[i] *= rules->nudge / (length > SF_TINY ? length : SF_TINY);
-  sf_move(m, &run->here->state, run->step, 1.0, &run->there->state);
+  sf_go(run, 1.0);
   sf_look(run, run->there);
   up = run->there->point.potential;
-  sf_move(m, &run->here->state, run->step, -1.0, &run->there->state);
+  sf_go(run, -1.0);
   sf_look(run, run->there);
   down = run->there->point.potential;
   larger = fabs(up) > fabs(down) ? fabs(up) : fabs(down);
   /* A symmetric pair differs by rounding only: then the first side, so that answers repeat. */
-  if (!(up - down > rules->level * larger)) sf_move(m, &run->here->state, run->step, 1.0, &run->there->state);
+  if (!(up - down > rules->level * larger)) sf_go(run, 1.0);
   sf_swap(run);
 }
 
@@ -319,20 +345,20 @@ static int sf_corrected(sf_run_of *run, int most, int *negative) {
     if (!sf_is_finite(run->here->size)) return SF_NOT_FINITE;
     found = sf_newton(run, negative);
     if (!rules->symmetric) *negative = SF_NOT_DEFINED;
-    if (!first && run->here->size <= rules->rounding) return SF_SOLVED;
+    if (!first && run->here->size <= rules->rounding) return sf_ended(run);
     length = found ? sf_length(run, run->step) : HUGE_VAL;
     if (!(length <= rules->far) || length > (last > rules->near ? last : rules->near)) return SF_STALLED;
     first = 0;
     last = length;
-    sf_move(run->m, &run->here->state, run->step, 1.0, &run->there->state);
+    sf_go(run, 1.0);
     sf_look(run, run->there);
     if (run->here->size <= rules->converged && !(run->there->size <= rules->gain * run->here->size)) {
       if (run->there->size < run->here->size) sf_swap(run);
-      return SF_SOLVED;
+      return sf_ended(run);
     }
     sf_swap(run);
   }
-  return run->here->size <= rules->converged ? SF_SOLVED : SF_ITERATIONS;
+  return run->here->size <= rules->converged ? sf_ended(run) : SF_ITERATIONS;
 }
 
 /* By whole steps to an equilibrium that need not be left. */
@@ -373,7 +399,6 @@ static void sf_take(sf_run_of *run, const double *row) {
 static void sf_begin(sf_run_of *run, const double *numbers, int undeformed) {
   const sf_model *m = run->m;
   const sf_inputs *inputs = run->inputs;
-  const double *vector = run->given + m->given, *angle = vector + 3 * inputs->turning;
   sf_state *state = &run->here->state;
   int i, k;
   sf_copy(state->q, numbers, sf_state_size(m));
@@ -382,9 +407,8 @@ static void sf_begin(sf_run_of *run, const double *numbers, int undeformed) {
     double *q = state->q + (size_t)4 * i, size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     for (k = 0; k < 4; ++k) q[k] /= size;
   }
-  sf_prescribe(m, inputs->turning, inputs->turned, vector, state);
-  for (i = 0; i < m->angles; ++i)
-    if (undeformed || inputs->held[i]) state->unwrapped[i] = angle[i];
+  sf_prescribe(m, inputs->turning, inputs->turned, run->given + m->given, state);
+  sf_hold_angles(run, undeformed, state);
 }
 
 /* A row with a share of all loads and motions, or on the way to it from where it was begun; taken. */

@@ -244,7 +244,7 @@ typedef struct {
   int iterations, corrections, rounds, halvings, escapes, sweeps;
   int symmetric, minimisable, downhill, pivoted, sliding;
   double converged, rounding, gain, turn, near, proximal, soft, hard, firm, firmer, left, armijo, noise, nudge, far;
-  double shortest, level, least;
+  double shortest, level, least, miscounted;
 } sf_rules;
 
 /* How it ended. */

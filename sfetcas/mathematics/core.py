@@ -260,7 +260,7 @@ class Rules(ctypes.Structure):
         *((name, _int) for name in ("sweeps", "symmetric", "minimisable", "downhill", "pivoted", "sliding")),
         *((name, _double) for name in ("converged", "rounding", "gain", "turn", "near", "proximal", "soft", "hard")),
         *((name, _double) for name in ("firm", "firmer", "left", "armijo", "noise", "nudge", "far", "shortest")),
-        *((name, _double) for name in ("level", "least")),
+        *((name, _double) for name in ("level", "least", "miscounted")),
     )
 
 

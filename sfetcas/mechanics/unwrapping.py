@@ -20,7 +20,7 @@ from .loading import Loading
 from .rotations import RotationFreedom
 from .terms import GROUND, Group
 
-__all__ = ["Unwrapping", "unwrapping_of"]
+__all__ = ["MISCOUNTED", "Unwrapping", "unwrapping_of"]
 
 MISCOUNTED = 1e-6
 """Angle, rad, by which a counted angle may miss the one that a motion prescribes: they differ by turns or not."""

@@ -33,6 +33,7 @@ from ..mathematics.core import Sought, doubles, integers
 from ..mathematics.linear import InertiaSolver, SparseSolver
 from ..mechanics.equations import State
 from ..mechanics.inputs import Inputs, Taken
+from ..mechanics.unwrapping import MISCOUNTED
 from .residuals import LEAST_SCALE, relative_residual
 from .sides import Sides
 
@@ -295,6 +296,7 @@ class Globalised:
             sliding=self._sliding,
             level=tolerances.LEVEL,
             least=LEAST_SCALE,
+            miscounted=MISCOUNTED,
             **vars(rules),
             **{name: array.ctypes.data for name, array in arrays.items()},
         )
@@ -410,8 +412,10 @@ class Globalised:
         size = relative_residual(given.equations, point)
         return _Here(state, point.residual, size, point.potential, gaps, point.entries)
 
-    def _moved(self, state: State, step: Array, share: float) -> State:
-        return self.equations.moved(state, share * step)
+    def _moved(self, state: State, step: Array, share: float, given: Taken) -> State:
+        there = self.equations.moved(state, share * step)
+        # However far a step turns what is driven, it is the drive that says how often.
+        return replace(there, unwrapped=np.where(self.inputs.held, given.angles, there.unwrapped))
 
     def _length(self, step: Array) -> float:
         return float(np.abs(step[: self._rotation_unknowns]).max(initial=0.0))
@@ -476,6 +480,11 @@ class Globalised:
         return replace(found, code=Code.UNSTABLE)
 
     def _ended(self, code: Code, here: _Here, negative: int = NOT_DEFINED) -> Outcome:
+        if code is Code.SOLVED and self.inputs.held.any():
+            wanted = here.state.unwrapped
+            apart = np.abs(self._model.unwrapping.angles(here.state.q, wanted) - wanted)[self.inputs.held]
+            # What is driven stands by whole turns from where its drive says: that is no equilibrium of it.
+            code = code if (apart <= MISCOUNTED).all() else Code.STALLED
         return Outcome(code, here.state.flat, here.size, negative, 0)
 
     def _descended(self, here: _Here, given: Taken) -> Outcome:
@@ -491,7 +500,7 @@ class Globalised:
             first = False
             if step is not None and self._length(step) < rules.near:
                 # Near an equilibrium, stable or not, Newton's own step leads to it.
-                there = self._at(self._moved(here.state, step, 1.0), given)
+                there = self._at(self._moved(here.state, step, 1.0, given), given)
                 if here.size <= rules.converged and not there.size <= rules.gain * here.size:
                     best = there if there.size < here.size else here
                     return self._ended(Code.SOLVED, best, self._factor(best.entries, 0.0))
@@ -520,7 +529,7 @@ class Globalised:
         slope = float(here.residual[:n] @ step[:n]) + float(lam @ here.residual[n:]) - penalty * here.gaps
         slope, before = min(slope, 0.0), here.potential + penalty * here.gaps
         for _ in range(rules.halvings):
-            state = self._moved(here.state, step, scale)
+            state = self._moved(here.state, step, scale, given)
             there = self._at(state, given)
             wanted = rules.armijo * (scale - 0.5 * scale**2) * slope
             if there.potential + penalty * there.gaps - before <= wanted + rules.noise * abs(before):
@@ -534,7 +543,7 @@ class Globalised:
         """The state displaced along its lowest mode to the side of lower energy."""
         shape = self._softest(self._at(state, given).entries)
         shape *= self.rules.nudge / max(self._length(shape), TINY)
-        sides = [self._moved(state, shape, share) for share in (1.0, -1.0)]
+        sides = [self._moved(state, shape, share, given) for share in (1.0, -1.0)]
         up, down = (self._at(side, given).potential for side in sides)
         # A symmetric pair differs by rounding only: then the first side, so that answers repeat.
         return sides[1] if up - down > tolerances.LEVEL * max(abs(up), abs(down)) else sides[0]
@@ -596,7 +605,7 @@ class Globalised:
             if step is None or not length <= rules.far or length > max(last, rules.near):
                 return self._ended(Code.STALLED, here)
             first, last = False, length
-            there = self._at(self._moved(here.state, step, 1.0), given)
+            there = self._at(self._moved(here.state, step, 1.0, given), given)
             if here.size <= rules.converged and not there.size <= rules.gain * here.size:
                 return self._ended(Code.SOLVED, there if there.size < here.size else here, negative)
             here = there
