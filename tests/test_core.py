@@ -224,18 +224,18 @@ def test_rows_are_solved_as_in_python(name, monkeypatch):
     inputs = Inputs(prepared.equations)
     rows = [inputs.of(model.loading(factor)) for factor in (0.3, 1.0)]
     method = Globalised(inputs, prepared.weight, Rules(escapes=0))
-    cold = [both(method, row) for row in rows]
+    cold = [solved_twice(method, row) for row in rows]
     if Code.SOLVED not in {found.code for found in cold[:1]}:
         return
-    both(method, rows[1], cold[0].state, warm=True)
-    assert both(method, rows[0], cold[0].state, warm=True).iterations <= 3
+    solved_twice(method, rows[1], cold[0].state, warm=True)
+    assert solved_twice(method, rows[0], cold[0].state, warm=True).iterations <= 3
     # Where whole steps are too long what is given becomes another little by little.
     counted = Counted(Globalised._followed)
     monkeypatch.setattr(Globalised, "_followed", counted)
     monkeypatch.setattr(type(model), "downhill", property(lambda _: False))
     rules = Rules(escapes=0, far=FAR.get(name, 0.1), near=0.01)
     way = Globalised(inputs, prepared.weight, rules, begun=(rows[0], cold[0].state))
-    found = both(way, rows[1], cold[0].state, warm=True)
+    found = solved_twice(way, rows[1], cold[0].state, warm=True)
     assert counted.calls
     assert found.code is Code.SOLVED
 
@@ -258,7 +258,7 @@ class Counted:
         return called
 
 
-def both(method, row, start=None, *, warm=False):
+def solved_twice(method, row, start=None, *, warm=False):
     mine, other = method(row, start, warm=warm), method._step_by_step(row, start, warm=warm)
     assert mine.code == other.code
     assert abs(mine.iterations - other.iterations) <= 2
