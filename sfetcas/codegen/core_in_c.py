@@ -17,6 +17,7 @@ from ..mathematics.arrays import Array
 from ..mathematics.core import TapeTable
 from ..mathematics.linear import factor_tables, last_rows, pivot_order
 from ..mathematics.source import table
+from ..mathematics.tapes import NAMES
 from ..mechanics.evaluation import Handed, handed
 from ..parametric.equilibrium import EquilibriumSolver
 from .rendering import optimised
@@ -54,6 +55,42 @@ def _included(name: str, done: set[str]) -> str:
     return re.sub(r'#include "([\w.]+)"', lambda match: _included(match[1], done), text)
 
 
+FEW, LONGEST = 4, 3_000
+"""Up to so many terms compiled operations are faster than those of a tape, which are for eight at once; and the longest
+tape that compiles in a fraction of a second.
+"""
+
+
+@functools.cache
+def _expressions() -> list[str]:
+    """For each operation of a tape what it is in C, of ``{x}`` and ``{y}``."""
+    text = (SOURCES / "tape.c").read_text(encoding="utf-8") + (SOURCES / "lanes.h").read_text(encoding="utf-8")
+    found = dict(re.findall(r"case SF_(\w+): return (.*);", text))
+    found |= {name: what.replace("[l]", "") for name, what in re.findall(r"(?:UNARY|BINARY)\(SF_(\w+), (.*)\)", text)}
+    return [re.sub(r"\b([xy])\b", r"{\1}", found.get(name, "")) for name in NAMES]
+
+
+def compiled(name: str, stretch: Array, code: Array, constant: Array, slots: int) -> str:
+    """A tape as a function in C, of the arguments and results of one term."""
+    lines = [f"static void {name}(const double *in, double *out) {{"]
+    lines += [
+        f"  double {', '.join(f'w{i}' for i in range(k, min(k + 20, slots)))};" for k in range(0, slots, 20) if slots
+    ]
+    kinds = np.repeat(stretch[:, 0], stretch[:, 1]).tolist()
+    values = [repr(float(x)) if np.isfinite(x) else "HUGE_VAL" if x > 0 else "-HUGE_VAL" for x in constant]
+    values = ["NAN" if np.isnan(x) else text for x, text in zip(constant, values, strict=True)]
+    first = {"IN": "w{to}=in[{a}];", "OUT": "out[{to}]=w{a};", "CONSTANT": "w{to}={value};"}
+    for kind, (to, a, b) in zip(kinds, code.tolist(), strict=True):
+        operation = NAMES[kind]
+        if operation in first:
+            value = values[a] if operation == "CONSTANT" else ""
+            lines.append(first[operation].format(to=to, a=a, value=value))
+            continue
+        what = _expressions()[kind].format(x=f"w{a}", y=f"w{b}")
+        lines.append(f"w{to}={what};")
+    return "\n".join([*lines, "}\n"])
+
+
 class InC:
     """Structures of the core as initialisers in C, and the constant arrays that they point to.
 
@@ -61,6 +98,8 @@ class InC:
     ----------
     arrays : mapping
         What the structures point to, by addresses.
+    compiled : set of int
+        Addresses of tapes of which there are few terms: their operations are compiled, unless there are many.
 
     Attributes
     ----------
@@ -68,8 +107,8 @@ class InC:
         Definitions of the arrays, in the order in which they were met.
     """
 
-    def __init__(self, arrays: Mapping[int, Any]) -> None:
-        self._arrays, self.tables = arrays, list[str]()
+    def __init__(self, arrays: Mapping[int, Any], compiled: set[int]) -> None:
+        self._arrays, self._compiled, self.tables = arrays, compiled, list[str]()
         self._names, self._known = dict[int, str](), dict[tuple[str, bytes], str]()
 
     def value(self, structure: ctypes.Structure, **own: str) -> str:
@@ -105,11 +144,16 @@ class InC:
 
     def tape(self, tape: TapeTable) -> str:
         """The name of a tape."""
-        name = f"&sf_tape_{len(self.tables)}"
-        stretch, code = (self._pairs(self._arrays[address]) for address in (tape.stretch, tape.code))
-        inner = self.value(tape, stretch=stretch, code=code)
-        self.tables.append(f"static const sf_tape {name[1:]} = {inner};\n")
-        return name
+        name = f"sf_tape_{len(self.tables)}"
+        stretch, code, constant = (self._arrays[address] for address in (tape.stretch, tape.code, tape.constant))
+        if ctypes.addressof(tape) in self._compiled and len(code) <= LONGEST:
+            self.tables.append(optimised("O1", compiled(f"{name}_compiled", stretch, code, constant, tape.slots)))
+            own = {"stretches": "0", "slots": "0", "stretch": "0", "code": "0", "constant": "0"}
+            inner = self.value(tape, **own, compiled=f"{name}_compiled")
+        else:
+            inner = self.value(tape, stretch=self._pairs(stretch), code=self._pairs(code))
+        self.tables.append(f"static const sf_tape {name} = {inner};\n")
+        return f"&{name}"
 
     def _pairs(self, rows: Array) -> str:
         """The name of an array of operations or stretches."""
@@ -156,7 +200,9 @@ class SolverTables:
             rules.convex, rules.stiffness = ctypes.addressof(convex[0]), known.layout.tapes[0].parts[4]
             points |= {rules.convex: convex[0], **{array.ctypes.data: array for array in convex[1]}}
         given.groups = len(varying)
-        text, n = InC(points), structure.total
+        few = {group.tape for group in known.groups if group.terms <= FEW}
+        few |= {rules.convex} if convex is not None and known.groups[0].terms <= FEW else set()
+        text, n = InC(points, few), structure.total
         groups = [
             text.value(group, **({"datum": "0"} if number in varying else {}))
             for number, group in enumerate(known.groups)

@@ -200,7 +200,7 @@ static void sf_convex(sf_run_of *run) {
   sf_evaluate(m, &run->here->state, run->given, p);
   for (first = 0; tape && first < group->terms; first += lanes) {
     int left = group->terms - first;
-    lanes = sf_lanes(left);
+    lanes = sf_lanes(tape, left);
     left = left < lanes ? left : lanes;
     for (l = 0; l < lanes; ++l)
       sf_gather(m, group, 1, first + (l < left ? l : left - 1), &run->here->state, run->given, p, &work, work.in + l,

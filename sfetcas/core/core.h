@@ -31,12 +31,16 @@ typedef struct {
   int operation, count;
 } sf_stretch;
 
-/* A function of one term: from its arguments, one after the other, to its results, one after the other. */
+/* A function of one term: from its arguments, one after the other, to its results, one after the other.
+ *
+ * Where the same operations are compiled, too, as in generated code, these are used for one term at a time.
+ */
 typedef struct {
   int stretches, slots, arguments, results, constants;
   const sf_stretch *stretch;
   const sf_operation *code;
   const double *constant;
+  void (*compiled)(const double *arguments, double *results);
 } sf_tape;
 
 /* ---- sparse matrices ---------------------------------------------------------------------------- */

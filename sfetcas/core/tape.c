@@ -141,10 +141,12 @@ int sf_arrange(int operations, const int *code, sf_stretch *stretch, sf_operatio
 }
 
 /* Lanes for what is left to do. */
-static int sf_lanes(int left) { return left > 1 ? 8 : 1; }
+static int sf_lanes(const sf_tape *tape, int left) { return left > 1 && !tape->compiled ? 8 : 1; }
 
 static void sf_lanes_run(int lanes, const sf_tape *tape, const double *in, double *out, int left, double *w) {
-  if (lanes == 8)
+  if (tape->compiled)
+    tape->compiled(in, out);
+  else if (lanes == 8)
     sf_eight(tape, in, out, left, w);
   else
     sf_one(tape, in, out, left, w);
@@ -159,7 +161,7 @@ int sf_run(const sf_tape *tape, int count, const double *arguments, double *resu
   for (first = 0; first < count; first += lanes) {
     int left = count - first;
     double *in = work + (size_t)8 * tape->slots;
-    lanes = sf_lanes(left);
+    lanes = sf_lanes(tape, left);
     left = left < lanes ? left : lanes;
     for (l = 0; l < lanes; ++l) {
       /* Lanes without a term repeat the last one: what they give is not looked at. */

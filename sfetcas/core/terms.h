@@ -45,7 +45,7 @@ static void sf_terms(const sf_model *m, int number, const sf_state *s, const dou
   int first, lanes, l;
   for (first = 0; first < group->terms; first += lanes) {
     int left = group->terms - first;
-    lanes = sf_lanes(left);
+    lanes = sf_lanes(tape, left);
     left = left < lanes ? left : lanes;
     for (l = 0; l < lanes; ++l)
       sf_gather(m, group, number == 0, first + (l < left ? l : left - 1), s, given, p, work, work->in + l, lanes);

@@ -58,6 +58,7 @@ class TapeTable(ctypes.Structure):
         ("stretch", _pointer),
         ("code", _pointer),
         ("constant", _pointer),
+        ("compiled", _pointer),
     )
 
 
@@ -307,7 +308,7 @@ def table_of(tape: Tape) -> tuple[TapeTable, list[Array]]:
         stretch, slots = most[:count].copy(), needed.value
     sizes = (len(stretch), slots, tape.arguments, tape.results, len(constant))
     arrays = [stretch, arranged, constant]
-    return TapeTable(*sizes, *(array.ctypes.data for array in arrays)), arrays
+    return TapeTable(*sizes, *(array.ctypes.data for array in arrays), None), arrays
 
 
 def _stretches(code: Array) -> Array:
