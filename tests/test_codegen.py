@@ -96,6 +96,27 @@ def test_c_gives_the_bits_of_the_solver_in_process(file, tmp_path):
     assert float(found) == pytest.approx(wanted, rel=30.0 * scene.analysis.accuracy, abs=1e-12)
 
 
+@needs_compiler
+@pytest.mark.parametrize("name", ["nothing is free", "many entries"])
+def test_c_has_the_bits_of_the_process_whatever_the_size(name, tmp_path):
+    if name == "many entries":
+        table = scenes.bend_45()
+        for member in table["members"].values():
+            member["elements"] = 235
+    else:
+        table = {
+            "dimension": "space",
+            "nodes": {"A": {"position": [0, 0, 0], "support": "clamped"}, "B": {"position": [1, 0, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "type": "rigid"}},
+            "loads": {"f": {"type": "force", "node": "B", "value": [0.3, -0.2, 0.7]}},
+            "motions": {"turn": {"node": "A", "rotation": [0.4, -0.7, 0.2]}},
+        }
+    made = export(Scene.from_dict(table), tmp_path / "c", name="structure", results=["nodes.B.position"])
+    assert (len(made.method.equations.row) > 50_000) == (name == "many entries")
+    words = re.match(r"(\d+) of (\d+) cases agree, (\d+) of them", said(built(tmp_path / "c", "structure")))
+    assert words[1] == words[2] == words[3]
+
+
 @pytest.mark.skipif(c.core() is None, reason="there is no core")
 @pytest.mark.parametrize("name", ["linked", "sliding_plane", "hinged_space", "following_space", "helix"])
 def test_memory_of_c_is_what_the_core_takes(name):

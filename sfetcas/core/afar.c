@@ -403,8 +403,10 @@ static void sf_begin(sf_run_of *run, const double *numbers, int undeformed) {
   int i, k;
   sf_copy(state->q, numbers, sf_state_size(m));
   for (i = 0; m->space && !undeformed && i < m->rotations; ++i) {
-    /* A start that somebody gives may have quaternions that are not normalised. */
-    double *q = state->q + (size_t)4 * i, size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    /* A start that somebody gives may have quaternions that are not normalised, however large. */
+    double *q = state->q + (size_t)4 * i, size = sf_largest(q, 4);
+    for (k = 0; k < 4; ++k) q[k] /= size;
+    size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     for (k = 0; k < 4; ++k) q[k] /= size;
   }
   sf_prescribe(m, inputs->turning, inputs->turned, run->given + m->given, state);

@@ -200,22 +200,24 @@ class SparseSolver:
 
     @functools.cached_property
     def _system(self) -> CoreSystem:
+        return self._of(self._filled.row, self._filled.column)
+
+    def _of(self, row: Array, column: Array) -> CoreSystem:
         assert self._core is not None
-        last = last_rows(self._rows)
-        return CoreSystem(
-            self._core,
-            self.n,
-            self._filled.row,
-            self._filled.column,
-            self._sides,
-            last,
-            self._symmetric and not self._pivoted,
-        )
+        symmetric = self._symmetric and not self._pivoted
+        return CoreSystem(self._core, self.n, row, column, self._sides, last_rows(self._rows), symmetric)
 
     @property
     def of_core(self) -> CoreSystem | None:
         """The system of the core that takes all entries of the pattern; None where there is none."""
         return self._system if self._core is not None and self._filled.every and self.n else None
+
+    @property
+    def whole(self) -> CoreSystem | None:
+        """As :attr:`of_core`, also where there are many, of which most may be zero, or none."""
+        if self._core is None or self.of_core is not None:
+            return self.of_core
+        return self._of(self._row, self._column)
 
     @functools.cached_property
     def _sparse(self) -> _Sparse:

@@ -497,7 +497,10 @@ class Equations:
         """
         if self._core is None or not self._core.searchable:
             return None
-        return self.apart() if varying else self._with_system
+        core, system = self._core, self.solver.whole
+        if varying:
+            core, system = core.of(self.model), self._new_solver().whole
+        return None if system is None else (core, system)
 
     def clearly_negative(self, entries: Array, counting: Counting) -> int | None:
         """Number of negative eigenvalues by the core; None without one, where one is near zero, or nobody knows."""

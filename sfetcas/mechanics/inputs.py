@@ -143,6 +143,8 @@ class Inputs:
         """A state with prescribed rotations and angles at their values, quaternions normalised."""
         q, model = state.q.copy(), self.equations.model
         if model.space:
+            # However large those of a start are that somebody gives.
+            q /= np.abs(q).max(axis=1, keepdims=True)
             q /= np.linalg.norm(q, axis=1, keepdims=True)
         q[self.turned] = model.prescribed_rotations(taken.vectors)
         return State(q, state.y, state.lam, np.where(self.held, taken.angles, state.unwrapped))

@@ -27,7 +27,7 @@ from ..mechanics.fields import transferred
 from ..mechanics.inputs import Inputs
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
-from ..solvers.globalised import MEANINGS, Code, Globalised, Outcome, Rules
+from ..solvers.globalised import MEANINGS, NOT_DEFINED, Code, Globalised, Outcome, Rules
 from ..solvers.prepared import Prepared, Solved
 from .arguments import Arguments, Asked, asked_for, in_words
 from .results import Results, default_results
@@ -204,9 +204,9 @@ class EquilibriumSolver:
             # A stiffness of what is singular.
             outputs = nothing
         if not np.isfinite(outputs).all():
-            return replace(outcome, code=Code.NOT_FINITE), nothing
+            return replace(outcome, code=Code.NOT_FINITE, negative=NOT_DEFINED), nothing
         if self.margins is not None and not np.array(self.margins(p, outcome.state, given)).min(initial=0.0) >= LEAST:
-            return replace(outcome, code=Code.TOUCHES), nothing
+            return replace(outcome, code=Code.TOUCHES, negative=NOT_DEFINED), nothing
         return replace(outcome, error=float(self.error(outcome.state, given))), outputs
 
     def found(self, arguments: Array, start: Array | None = None, places: Array | None = None) -> Outcome:
