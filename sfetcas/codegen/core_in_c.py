@@ -73,9 +73,7 @@ def _expressions() -> list[str]:
 def compiled(name: str, stretch: Array, code: Array, constant: Array, slots: int) -> str:
     """A tape as a function in C, of the arguments and results of one term."""
     lines = [f"static void {name}(const double *in, double *out) {{"]
-    lines += [
-        f"  double {', '.join(f'w{i}' for i in range(k, min(k + 20, slots)))};" for k in range(0, slots, 20) if slots
-    ]
+    lines += [f"double {','.join(f'w{i}' for i in range(k, min(k + 20, slots)))};" for k in range(0, slots, 20)]
     kinds = np.repeat(stretch[:, 0], stretch[:, 1]).tolist()
     values = [repr(float(x)) if np.isfinite(x) else "HUGE_VAL" if x > 0 else "-HUGE_VAL" for x in constant]
     values = ["NAN" if np.isnan(x) else text for x, text in zip(constant, values, strict=True)]

@@ -11,7 +11,7 @@ import numpy as np
 
 from .arrays import Array
 
-__all__ = ["functions_in_c", "loadable", "sizes_of", "sparsity_table", "table"]
+__all__ = ["functions_in_c", "loadable", "sizes_of", "table"]
 
 
 DEFINITION = re.compile(r"^(?:static )?(?:int|void|double|casadi_real|casadi_int|const \w+\*) (\w+)\(")
@@ -121,9 +121,3 @@ def table(name: str, values: Array, kind: str = "double") -> str:
 
 def _double(x: float) -> str:
     return repr(x) if np.isfinite(x) else "HUGE_VAL" if x > 0.0 else "-HUGE_VAL"
-
-
-def sparsity_table(name: str, sparsity: ca.Sparsity) -> str:
-    """A sparsity pattern in the form that the generated functions read."""
-    rows, columns = sparsity.shape
-    return table(name, np.array([rows, columns, *sparsity.colind(), *sparsity.row()]), "int")
