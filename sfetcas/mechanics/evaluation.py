@@ -11,7 +11,7 @@ import copy
 import ctypes
 import functools
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from .layout import Layout
 from .model import Model
 from .terms import rotation_gradient
 
-__all__ = ["UNLOADED", "CoreModel", "CorePoint", "Handed", "Parts", "core_model", "handed"]
+__all__ = ["UNLOADED", "CoreModel", "CorePoint", "Handed", "Parts", "Search", "core_model", "handed"]
 
 UNLOADED = 1e-6
 """Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
@@ -302,6 +302,46 @@ class Handed:
         return self.structure.elements, self.structure.points, self.structure.axes
 
 
+class Search:
+    """The globalised Newton method of one model, which keeps what the core is given alive.
+
+    Parameters
+    ----------
+    model : CoreModel
+    system : CoreSystem
+    rules, inputs
+        As the core takes them.
+    arrays : list of ndarray
+        What these point to.
+    """
+
+    def __init__(
+        self, model: CoreModel, system: CoreSystem, rules: c.Rules, inputs: c.Inputs, arrays: list[Array]
+    ) -> None:
+        self._model, self._system, self._rules, self._inputs, self._arrays = model, system, rules, inputs, arrays
+        self._point, self._memory = CorePoint(model), np.empty(model.library.sf_find_size(*self._addresses))
+        # One call at a time has this memory.
+        self._lock = threading.Lock()
+
+    @property
+    def _addresses(self) -> tuple[int, int, int]:
+        return self._model.address, ctypes.addressof(self._rules), ctypes.addressof(self._inputs)
+
+    def __call__(self, row: Array, state: Array, begins: int) -> c.Sought | None:
+        """Search for a row (inputs,) from a state (states,), which is changed: see ``sf_find`` for how it begins.
+
+        None where the seed of the rules is missing.
+        """
+        model, sought, row = self._model, c.Sought(), c.doubles(row)
+        address, *controls = self._addresses
+        given = (*controls, row.ctypes.data, begins, state.ctypes.data)
+        rest = (self._point.address, self._memory.ctypes.data, ctypes.addressof(sought))
+        with self._lock:
+            while (ended := model.library.sf_find(address, self._system.address, *given, *rest)) == NO_ROOM:
+                self._system.make_room()
+        return None if ended else sought
+
+
 class CoreModel:
     """One model for the core, the memory that evaluating takes, and calls.
 
@@ -313,6 +353,9 @@ class CoreModel:
 
     Attributes
     ----------
+    library : CDLL
+    address : int
+        Where the core finds it.
     places : ndarray (places, axes)
         Displacements of retained places at the last state.
     pull : ndarray (elements, points, axes)
@@ -322,18 +365,18 @@ class CoreModel:
     """
 
     def __init__(self, library: ctypes.CDLL, handed: Handed) -> None:
-        self._library, self._handed, self._layout = library, handed, handed.layout
+        self.library, self._handed, self._layout = library, handed, handed.layout
         self.total, self.entry_count = handed.structure.total, handed.structure.entry_count
-        self._address = ctypes.addressof(handed.structure)
+        self.address = ctypes.addressof(handed.structure)
         self._results, self.pull = np.zeros(handed.structure.results), np.zeros(handed.along)
         self.places = np.zeros((handed.structure.places, handed.structure.axes))
-        self._work = np.zeros(max(1, library.sf_work_size(self._address)))
+        self._work = np.zeros(max(1, library.sf_work_size(self.address)))
         self.shared = tuple(part.ctypes.data for part in (self._results, self.places, self.pull, self._work))
         self._scratch = CorePoint(self)
 
     def of(self, model: Model) -> CoreModel:
         """The same of a model that differs by the data of terms alone, with memory of its own."""
-        return CoreModel(self._library, self._handed.of(model))
+        return CoreModel(self.library, self._handed.of(model))
 
     # -- calls ----------------------------------------------------------------------------------------
 
@@ -350,7 +393,7 @@ class CoreModel:
     def evaluate(self, state: tuple[Array, Array, Array, Array], given: Array) -> Parts:
         """Results of all terms at a state (q, y, lam, unwrapped); they are overwritten by the next call."""
         handed, arrays = self._state(*state)
-        self._library.sf_evaluate(self._address, ctypes.addressof(handed), given.ctypes.data, self._scratch.address)
+        self.library.sf_evaluate(self.address, ctypes.addressof(handed), given.ctypes.data, self._scratch.address)
         del arrays
         return self.parts
 
@@ -368,7 +411,7 @@ class CoreModel:
         """The equations at a state (q, y, lam, unwrapped)."""
         point = CorePoint(self)
         handed, arrays = self._state(*state)
-        self._library.sf_at(self._address, ctypes.addressof(handed), given.ctypes.data, point.address)
+        self.library.sf_at(self.address, ctypes.addressof(handed), given.ctypes.data, point.address)
         del arrays
         return point
 
@@ -378,7 +421,7 @@ class CoreModel:
         q, y, lam, unwrapped = there = tuple(np.empty(part.shape) for part in arrays)
         target = c.State(*(part.ctypes.data for part in there))
         step = c.doubles(step)
-        self._library.sf_move(self._address, ctypes.addressof(handed), step.ctypes.data, 1.0, ctypes.addressof(target))
+        self.library.sf_move(self.address, ctypes.addressof(handed), step.ctypes.data, 1.0, ctypes.addressof(target))
         return q, y, lam, unwrapped
 
     def slope(self, state: tuple[Array, Array, Array, Array], rate: Array) -> Array:
@@ -387,8 +430,8 @@ class CoreModel:
         handed, arrays = self._state(*state)
         rest = (rate.ctypes.data, point.address, slope.ctypes.data, self._sloping.ctypes.data)
         # Of the point the derivatives of chords are read: they are those of the state.
-        self._library.sf_evaluate(self._address, ctypes.addressof(handed), self._still.ctypes.data, point.address)
-        self._library.sf_slope(self._address, ctypes.addressof(handed), *rest)
+        self.library.sf_evaluate(self.address, ctypes.addressof(handed), self._still.ctypes.data, point.address)
+        self.library.sf_slope(self.address, ctypes.addressof(handed), *rest)
         del arrays
         return slope
 
@@ -431,7 +474,7 @@ class CoreModel:
             *(ctypes.addressof(limits), ctypes.addressof(handed), point.address),
         )
         memory = (self._correcting.ctypes.data, ctypes.addressof(report))
-        while self._library.sf_correct(self._address, *addresses, *of_structures, *memory) == NO_ROOM:
+        while self.library.sf_correct(self.address, *addresses, *of_structures, *memory) == NO_ROOM:
             system.make_room()
         return there, point, report
 
@@ -468,7 +511,7 @@ class CoreModel:
         while True:
             handed, there = self._changed(state)
             addressed = (*addresses, ctypes.addressof(handed), *rest)
-            ended = self._library.sf_follow(self._address, system.address, *addressed)
+            ended = self.library.sf_follow(self.address, system.address, *addressed)
             if ended != NO_ROOM:
                 return there, not ended
             # From the beginning: the matrix of the last step is not known any more.
@@ -476,36 +519,18 @@ class CoreModel:
             ctypes.pointer(way)[0] = begun
 
     def search(
-        self, system: CoreSystem, rules: c.Rules, inputs: c.Inputs, varying: Sequence[int]
-    ) -> Callable[[Array, Array, int], c.Sought | None]:
-        """The globalised Newton method, ready to be called with a row, a state that it changes, and how it begins.
+        self, system: CoreSystem, rules: c.Rules, inputs: c.Inputs, varying: Sequence[int], arrays: list[Array]
+    ) -> Search:
+        """The globalised Newton method, ready to be called; ``arrays`` are what rules and inputs point to.
 
-        What is returned is None where the seed of ``rules`` is missing, see ``sf_find``.  The data of groups that vary
-        are overwritten, so that this model is no other's.
+        The data of groups that vary are overwritten, so that this model is no other's.
         """
         convex = self._layout.convex
         if convex is not None:
             rules.convex, rules.stiffness = ctypes.addressof(convex[0]), self._layout.tapes[0].parts[4]
         known = self._own(varying)
         inputs.groups, inputs.count, inputs.datum = len(varying), known[0].ctypes.data, known[1].ctypes.data
-        controls = (ctypes.addressof(rules), ctypes.addressof(inputs))
-        memory, point = np.empty(self._library.sf_find_size(self._address, *controls)), CorePoint(self)
-        # One call at a time has this memory.
-        lock, alive = threading.Lock(), (rules, inputs, known, convex)
-
-        def found(row: Array, state: Array, begins: int) -> c.Sought | None:
-            sought, row = c.Sought(), c.doubles(row)
-            given = (row.ctypes.data, begins, state.ctypes.data)
-            rest = (point.address, memory.ctypes.data, ctypes.addressof(sought))
-            with lock:
-                while True:
-                    ended = self._library.sf_find(self._address, system.address, *controls, *given, *rest)
-                    if ended != NO_ROOM:
-                        break
-                    system.make_room()
-            return None if alive and ended else sought
-
-        return found
+        return Search(self, system, rules, inputs, [*arrays, *known])
 
     def _own(self, varying: Sequence[int]) -> tuple[Array, Array]:
         """Sizes and addresses of the data of groups, which are copied, so that they can be overwritten."""
@@ -525,7 +550,7 @@ class CoreModel:
     def negative(self, system: CoreSystem, entries: Array, counting: c.Counting) -> int | None:
         """Number of negative eigenvalues of a matrix; None where one is near zero, or factors do not tell."""
         addresses = (system.address, entries.ctypes.data, ctypes.addressof(counting), self._following.ctypes.data)
-        found = int(self._library.sf_negative(self._address, *addresses))
+        found = int(self.library.sf_negative(self.address, *addresses))
         return None if found < 0 else found
 
     def solve_cases(
@@ -556,15 +581,15 @@ class CoreModel:
         cases.groups, cases.count, cases.datum = len(varying), counts.ctypes.data, places.ctypes.data
         addresses = [ctypes.addressof(part) for part in (cases, way, *limits, counting)]
         rest = (*addresses, self._scratch.address, self._following.ctypes.data)
-        while self._library.sf_solve_cases(self._address, system.address, *rest) == NO_ROOM:
+        while self.library.sf_solve_cases(self.address, system.address, *rest) == NO_ROOM:
             system.make_room()
 
     @functools.cached_property
     def _following(self) -> Array:
         """Memory that a way takes."""
-        return np.zeros(self._library.sf_follow_size(self._address))
+        return np.zeros(self.library.sf_follow_size(self.address))
 
     @functools.cached_property
     def _correcting(self) -> Array:
         """Memory that a correction takes."""
-        return np.zeros(self._library.sf_correct_size(self._address))
+        return np.zeros(self.library.sf_correct_size(self.address))

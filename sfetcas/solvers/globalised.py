@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import enum
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -29,9 +28,10 @@ from .. import tolerances
 from ..mathematics.arrays import TINY, Array
 from ..mathematics.core import Inputs as CoreInputs
 from ..mathematics.core import Rules as CoreRules
-from ..mathematics.core import Sought, doubles, integers
+from ..mathematics.core import doubles, integers
 from ..mathematics.linear import InertiaSolver, SparseSolver
 from ..mechanics.equations import State
+from ..mechanics.evaluation import Search
 from ..mechanics.inputs import Inputs, Taken
 from ..mechanics.unwrapping import MISCOUNTED
 from .residuals import LEAST_SCALE, relative_residual
@@ -251,26 +251,21 @@ class Globalised:
 
     # -- by the core ----------------------------------------------------------------------------------
 
-    def _searching(self, *, seeded: bool) -> Callable[[Array, Array, int], Sought | None] | None:
+    def _searching(self, *, seeded: bool) -> Search | None:
         """The core's method, with or without the seed, which is seldom needed; None without a core."""
         known = self.equations.for_search(self.inputs.varying)
         if known is None:
             return None
         core, system = known
-        rules, inputs, alive = self.for_core(seeded=seeded)
-        search = core.search(system, rules, inputs, self.inputs.varying)
-
-        def found(row: Array, state: Array, begins: int) -> Sought | None:
-            return search(row, state, begins) if alive else None
-
-        return found
+        rules, inputs, arrays = self.for_core(seeded=seeded)
+        return core.search(system, rules, inputs, self.inputs.varying, arrays)
 
     @functools.cached_property
-    def _search(self) -> Callable[[Array, Array, int], Sought | None] | None:
+    def _search(self) -> Search | None:
         return self._searching(seeded=False)
 
     @functools.cached_property
-    def _seeded(self) -> Callable[[Array, Array, int], Sought | None] | None:
+    def _seeded(self) -> Search | None:
         return self._searching(seeded=True)
 
     def for_core(self, *, seeded: bool = True) -> tuple[CoreRules, CoreInputs, list[Array]]:
@@ -309,10 +304,11 @@ class Globalised:
 
     def _by_core(self, row: Array, start: Array | None, *, warm: bool) -> Outcome | None:
         """The outcome by the core; None without one."""
-        if self._search is None:
-            return None
         begins = 0 if start is None else 2 if warm else 1
-        for search in (self._search, lambda *given: self._seeded(*given) if self._seeded else None):
+        for seeded in (False, True):
+            search = self._seeded if seeded else self._search
+            if search is None:
+                break
             state = np.full(self.states, np.nan) if start is None else np.array(start, dtype=float)
             sought = search(row, state, begins)
             if sought is not None:
