@@ -552,7 +552,7 @@ class CoreSystem:
 
 
 def factor_tables(n: int, row: Array, column: Array) -> list[Array]:
-    """What factors without pivoting take: see :attr:`CoreFactors.tables`."""
+    """What factors without pivoting take: the ``tables`` of :class:`CoreFactors`."""
     order = _sparse_order(n, row, column).astype(np.intc)
     start = np.searchsorted(column, np.arange(n + 1)).astype(np.intc)
     return [start, np.ascontiguousarray(row, dtype=np.intc), order, np.argsort(order).astype(np.intc)]

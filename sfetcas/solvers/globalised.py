@@ -167,8 +167,7 @@ class Outcome:
     places : ndarray (ends,)
         Where elements end beside the ends of lines that move with the numbers, if there are any.
     error : float
-        What a parametric solver says of the error of positions, see
-        :attr:`~sfetcas.parametric.equilibrium.EquilibriumSolver.error`; else nan.
+        What a parametric solver says of the error of positions; else nan.
     """
 
     code: Code
