@@ -125,9 +125,7 @@ def test_memory_of_c_is_what_the_core_takes(name):
     solver = equilibrium_solver(scene, "c", arguments=["factor"])
     tables, (core, system) = SolverTables(solver), solver.method.equations.for_search([])
     rules, inputs, alive = solver.method.for_core()
-    convex = core._layout.convex
-    if convex is not None:
-        rules.convex = ctypes.addressof(convex[0])
+    core._layout.set_convex(rules)
     addresses = [ctypes.addressof(part) for part in (core._handed.structure, rules, inputs)]
     library = c.core()
     assert tables.sizes["work"] == library.sf_work_size(addresses[0])

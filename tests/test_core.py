@@ -248,6 +248,15 @@ FAR = {"tripod": 0.02}
 """Longest step of each scene, rad, with which it does not get there at once; by default a tenth."""
 
 
+def test_a_start_of_another_length_is_refused():
+    prepared = Prepared(model_of(EVERYTHING["linked"](), 1, 3))
+    method = Globalised(Inputs(prepared.equations), prepared.weight)
+    row = method.inputs.of(prepared.model.loading(1.0))
+    for size in (0, method.states - 1, method.states + 1):
+        with pytest.raises(ValueError, match=f"start: found {size} numbers, accepted: {method.states}"):
+            method(row, np.zeros(size))
+
+
 class Counted:
     """A method that counts how often it is called."""
 

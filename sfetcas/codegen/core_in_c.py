@@ -194,8 +194,8 @@ class SolverTables:
         rules, given, arrays = method.for_core()
         points = known.arrays | {array.ctypes.data: array for array in arrays}
         structure, convex, varying = known.structure, known.layout.convex, inputs.varying
+        known.layout.set_convex(rules)
         if convex is not None:
-            rules.convex, rules.stiffness = ctypes.addressof(convex[0]), known.layout.tapes[0].parts[4]
             points |= {rules.convex: convex[0], **{array.ctypes.data: array for array in convex[1]}}
         given.groups = len(varying)
         few = {group.tape for group in known.groups if group.terms <= FEW}

@@ -497,9 +497,8 @@ class Equations:
         """
         if self._core is None or not self._core.searchable:
             return None
-        core, system = self._core, self.solver.whole
-        if varying:
-            core, system = core.of(self.model), self._new_solver().whole
+        system = (self._new_solver() if varying else self.solver).whole
+        core = self._core.of(self.model) if varying else self._core
         return None if system is None else (core, system)
 
     def clearly_negative(self, entries: Array, counting: Counting) -> int | None:

@@ -127,6 +127,11 @@ class CoreLayout:
         tape = None if self._element is None else tape_of(self._element.convex)
         return None if tape is None else c.table_of(tape)
 
+    def set_convex(self, rules: c.Rules) -> None:
+        """Say in the rules of a search where the positive matrices of elements are, if there are any."""
+        if self.convex is not None:
+            rules.convex, rules.stiffness = ctypes.addressof(self.convex[0]), self.tapes[0].parts[4]
+
     @property
     def searchable(self) -> bool:
         """Whether the globalised Newton method can be run by the core."""
@@ -525,9 +530,7 @@ class CoreModel:
 
         The data of groups that vary are overwritten, so that this model is no other's.
         """
-        convex = self._layout.convex
-        if convex is not None:
-            rules.convex, rules.stiffness = ctypes.addressof(convex[0]), self._layout.tapes[0].parts[4]
+        self._layout.set_convex(rules)
         known = self._own(varying)
         inputs.groups, inputs.count, inputs.datum = len(varying), known[0].ctypes.data, known[1].ctypes.data
         return Search(self, system, rules, inputs, [*arrays, *known])

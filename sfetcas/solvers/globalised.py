@@ -430,7 +430,14 @@ class Globalised:
             State to begin with; the undeformed one by default.
         warm : bool
             Whether that is an equilibrium for other values, from which whole steps are tried first.
+
+        Raises
+        ------
+        ValueError
+            The start has another length.
         """
+        if start is not None and np.shape(start) != (self.states,):
+            raise ValueError(f"start: found {np.size(start)} numbers, accepted: {self.states}, a state of this solver")
         return self._by_core(row, start, warm=warm) or self._step_by_step(row, start, warm=warm)
 
     def _step_by_step(self, row: Array, start: Array | None, *, warm: bool) -> Outcome:
