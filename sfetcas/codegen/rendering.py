@@ -126,11 +126,6 @@ class Writer(abc.ABC):
         """The CasADi functions that are written as C."""
 
     @property
-    def roots(self) -> set[str]:
-        """Names of the functions in C that the driver calls; by default all of :attr:`functions`."""
-        return {function.name() for function in self.functions}
-
-    @property
     @abc.abstractmethod
     def statuses(self) -> list[Status]:
         """Result codes of a call."""
@@ -195,7 +190,10 @@ class Writer(abc.ABC):
             "/* @title@\n *\n * Made by sfetcas; not meant to be read or changed. */",
             '#include "@name@.h"\n',
             WARNINGS,
-            optimised(self.optimisation, functions_in_c(self.functions, self.name, self.roots)),
+            optimised(
+                self.optimisation,
+                functions_in_c(self.functions, self.name, (function.name() for function in self.functions)),
+            ),
             "/* ---- tables ---- */\n",
             *self.tables,
             *(template(body) for body in (*self.bodies, *self.last)),
