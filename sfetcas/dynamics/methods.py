@@ -1,7 +1,8 @@
 """Time integration methods with stages: how rates at the stages of a step depend on the quantities there.
 
-A method is data and two formulas; a step is put together from them by :mod:`~sfetcas.dynamics.steps`.  All methods take
-the equations in their index-3 form: constraints hold at every stage, and internal forces are their multipliers.
+A method is a table of numbers, or a formula of its own; a step is put together from it by
+:mod:`~sfetcas.dynamics.steps`.  All methods take the equations in their index-3 form: constraints hold at every stage,
+and internal forces are their multipliers.
 
 Source: Chung and Hulbert 1993, Arnold and Bruls 2007 (generalised-alpha of index 3, doi 10.1007/s11044-007-9084-0);
 Hairer and Wanner, Solving Ordinary Differential Equations II, IV.5 and VII (Radau IIA).
@@ -17,28 +18,41 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, Index
 from ..mathematics.interpolation import integration
 from .stages import StageEquations
 
 __all__ = ["RADAU", "Begin", "GeneralisedAlpha", "Method", "Radau", "Relations", "StageMethod"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Relations:
-    """Rates at the stages as functions of the quantities there: ``X' = (X - X_0) C^T + v``, ``X'' = (X - X_0) B^T +
-    a``.
+    """What quantities and their rates have to do with each other in a step, as numbers of a method.
+
+    With what the quantities have moved by at the stages, ``X - X_0``, and the rates ``r_k`` that are kept from step to
+    step, scaled by powers of its length, ``h^p_k r_k``, each of
+
+        h X' = velocity (X - X_0) + velocity_kept r,      h^2 X'' = acceleration (X - X_0) + acceleration_kept r
+
+    at the stages, and the next ``r = after (X - X_0) + after_kept r``, is linear with the same numbers in all steps.
 
     Attributes
     ----------
-    C, B : MX (stages, stages)
-    v, a : MX (quantities, stages)
+    velocity, acceleration : ndarray (stages, stages)
+    velocity_kept, acceleration_kept : ndarray (stages, kept)
+    after : ndarray (kept, stages)
+    after_kept : ndarray (kept, kept)
+    powers : ndarray (kept,)
+        1 for velocities, 2 for accelerations.
     """
 
-    C: ca.MX
-    B: ca.MX
-    v: ca.MX
-    a: ca.MX
+    velocity: Array
+    acceleration: Array
+    after: Array
+    velocity_kept: Array
+    acceleration_kept: Array
+    after_kept: Array
+    powers: Index
 
 
 class Method(abc.ABC):
@@ -106,9 +120,10 @@ class Begin:
 class StageMethod(Method):
     """A method that is given by its :class:`Relations` alone."""
 
+    @property
     @abc.abstractmethod
-    def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
-        """The relations in a step of length h after rates (quantities, kept)."""
+    def relations(self) -> Relations:
+        """Its numbers."""
 
     def iteration(self, system: StageEquations) -> ca.Function:
         """The Newton iteration of the stage equations, as of :meth:`Method.iteration`."""
@@ -116,8 +131,23 @@ class StageMethod(Method):
 
     def constants(self, begin: Begin, h: ca.MX, factors: ca.MX) -> list[ca.MX]:
         """The relations, and the factors of the loads."""
-        given = self.relations(h, begin.rates)
-        return [begin.x, given.v, given.a, given.C, given.B, factors, begin.unwrapped]
+        given, scaled = self.relations, self._scaled(h, begin.rates)
+        v = ca.mtimes(scaled, ca.DM(given.velocity_kept.T)) / h
+        a = ca.mtimes(scaled, ca.DM(given.acceleration_kept.T)) / h**2
+        c, b = ca.DM(given.velocity) / h, ca.DM(given.acceleration) / h**2
+        return [begin.x, v, a, c, b, factors, begin.unwrapped]
+
+    def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
+        """The rates that are kept, as of :meth:`Method.after`."""
+        given = self.relations
+        found = ca.mtimes(moved, ca.DM(given.after.T))
+        if given.after_kept.any():
+            found += ca.mtimes(self._scaled(h, rates), ca.DM(given.after_kept.T))
+        return ca.horzcat(*(one / h**p for one, p in zip(ca.horzsplit(found), given.powers.tolist(), strict=True)))
+
+    def _scaled(self, h: ca.MX, rates: ca.MX) -> ca.MX:
+        powers = self.relations.powers.tolist()
+        return ca.horzcat(*(one * h**p for one, p in zip(ca.horzsplit(rates), powers, strict=True)))
 
 
 @final
@@ -132,26 +162,19 @@ class Radau(StageMethod):
         self.gain = 3.0 if stages == 2 else 20.0
 
     @functools.cached_property
-    def _inverse(self) -> Array:
-        """Inverse of the matrix of the method: derivatives at the stages over the length of the step."""
-        return np.asarray(np.linalg.inv(integration(self.places, self.places)))
-
-    def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
+    def relations(self) -> Relations:
         """Derivatives of the collocation polynomials at the stages."""
-        slopes = ca.DM(self._inverse)
-        ones = ca.DM.ones(1, self.stages)
-        first = ca.DM(self._inverse.sum(axis=1))
-        velocity = rates[:, 0]
+        slopes = np.linalg.inv(integration(self.places, self.places))
+        # The polynomials of X are those of X - X_0; the polynomials of X' have the velocity at the begin.
         return Relations(
-            C=slopes / h,
-            B=ca.DM(self._inverse @ self._inverse) / h**2,
-            v=ca.MX.zeros(velocity.shape[0], self.stages),
-            a=-ca.mtimes(velocity, first.T * ones) / h,
+            velocity=slopes,
+            acceleration=slopes @ slopes,
+            after=slopes[-1:],
+            velocity_kept=np.zeros((self.stages, 1)),
+            acceleration_kept=-slopes.sum(axis=1, keepdims=True),
+            after_kept=np.zeros((1, 1)),
+            powers=np.array([1]),
         )
-
-    def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
-        """The velocity at the last stage."""
-        return ca.mtimes(moved, ca.DM(self._inverse[-1])) / h
 
 
 RADAU = {
@@ -175,23 +198,22 @@ class GeneralisedAlpha(StageMethod):
         self.gamma = 0.5 + self.of_force - self.of_mass
         self.beta = 0.25 * (self.gamma + 0.5) ** 2
 
-    def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
+    @functools.cached_property
+    def relations(self) -> Relations:
         """Newmark's formulas with the auxiliary, acceleration-like variable of the method."""
-        velocity, lagging, true = ca.horzsplit(rates)
-        first = -velocity / (self.beta * h) - (0.5 / self.beta - 1.0) * lagging
+        # Velocity, auxiliary variable, true acceleration.
+        first = np.array([-1.0 / self.beta, 1.0 - 0.5 / self.beta, 0.0])
         share = (1.0 - self.of_mass) / (1.0 - self.of_force)
-        rest = (self.of_mass * lagging - self.of_force * true) / (1.0 - self.of_force)
+        rest = np.array([0.0, self.of_mass, -self.of_force]) / (1.0 - self.of_force)
+        velocity = np.array([1.0, 1.0 - self.gamma, 0.0]) + self.gamma * first
+        moved = np.array([[self.gamma], [1.0], [share]]) / self.beta
+        kept = np.stack([velocity, first, share * first + rest])
         return Relations(
-            C=self.gamma / (self.beta * h),
-            B=share / (self.beta * h**2),
-            v=velocity + h * ((1.0 - self.gamma) * lagging + self.gamma * first),
-            a=share * first + rest,
+            velocity=moved[:1],
+            acceleration=moved[2:],
+            after=moved,
+            velocity_kept=kept[:1],
+            acceleration_kept=kept[2:],
+            after_kept=kept,
+            powers=np.array([1, 2, 2]),
         )
-
-    def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
-        """Velocity, auxiliary acceleration-like variable, and true acceleration."""
-        velocity, lagging, _ = ca.horzsplit(rates)
-        now = self.relations(h, rates)
-        true = now.B * moved + now.a
-        follows = (moved - h * velocity) / (self.beta * h**2) - (0.5 / self.beta - 1.0) * lagging
-        return ca.horzcat(now.C * moved + now.v, follows, true)
