@@ -19,10 +19,11 @@ import numpy as np
 from sfetcas.description.scene import Analysis, History, Load, Member, Node, Scene
 from sfetcas.description.sections import CrossSection
 from sfetcas.dynamics.beginning import at_rest
-from sfetcas.dynamics.integrating import Memory, Stepper, integrate
+from sfetcas.dynamics.integrating import Stepper, integrate
 from sfetcas.dynamics.methods import GeneralisedAlpha, Method, Radau
 from sfetcas.dynamics.sampling import Sampler
 from sfetcas.dynamics.stages import StageEquations
+from sfetcas.dynamics.taken import Memory
 from sfetcas.mathematics.arrays import Array
 from sfetcas.mathematics.kernels import Kernels
 from sfetcas.mechanics.elements import ELEMENTS

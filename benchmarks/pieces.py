@@ -11,9 +11,10 @@ from sfetcas.description.scene import Analysis, Load, Member, Node, Scene
 from sfetcas.description.sections import CrossSection
 from sfetcas.description.springs import Spring
 from sfetcas.dynamics.beginning import at_rest
-from sfetcas.dynamics.integrating import Memory, Stepper
+from sfetcas.dynamics.integrating import Stepper
 from sfetcas.dynamics.methods import Radau
 from sfetcas.dynamics.stages import StageEquations
+from sfetcas.dynamics.taken import Memory
 from sfetcas.equilibria.single import solve_model
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.masses import masses_of

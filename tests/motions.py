@@ -10,9 +10,10 @@ from sfetcas import Scene, assemble, uniform_mesh
 from sfetcas.dynamics.beginning import at_rest, velocities
 from sfetcas.dynamics.conserving import Conserving
 from sfetcas.dynamics.inertia import Inertia
-from sfetcas.dynamics.integrating import Memory, Stepper
+from sfetcas.dynamics.integrating import Stepper
 from sfetcas.dynamics.methods import GeneralisedAlpha, Radau
 from sfetcas.dynamics.stages import StageEquations
+from sfetcas.dynamics.taken import Memory
 from sfetcas.mechanics.equations import Equations, State
 from sfetcas.mechanics.masses import masses_of
 

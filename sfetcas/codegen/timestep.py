@@ -16,12 +16,13 @@ from ..description.showing import shown
 from ..dynamics.impulses import Impulsive
 from ..dynamics.inertia import Inertia
 from ..dynamics.inertialess import refuse_spinning
-from ..dynamics.integrating import Memory, Stepper
+from ..dynamics.integrating import Stepper
 from ..dynamics.methods import Method, Radau
 from ..dynamics.motion import Mover
 from ..dynamics.simulation import INTEGRATORS, Simulation
 from ..dynamics.stages import StageEquations
 from ..dynamics.steps import LAST_CHANGE, step_function
+from ..dynamics.taken import Memory
 from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..mathematics.arrays import Array

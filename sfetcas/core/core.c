@@ -7,6 +7,7 @@
 #include "newton.c"
 #include "follow.c"
 #include "afar.c"
+#include "motion.c"
 
 int sf_version(void) { return SF_VERSION; }
 
@@ -30,6 +31,9 @@ int sf_sizes(int *sizes) {
   sizes[15] = (int)sizeof(sf_sought);
   sizes[16] = (int)sizeof(sf_inputs);
   sizes[17] = (int)sizeof(sf_stretch);
-  sizes[18] = SF_OPERATIONS;
+  sizes[18] = (int)sizeof(sf_observables);
+  sizes[19] = (int)sizeof(sf_motion);
+  sizes[20] = (int)sizeof(sf_advance_of);
+  sizes[21] = SF_OPERATIONS;
   return 0;
 }

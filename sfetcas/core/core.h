@@ -11,7 +11,7 @@
 #ifndef SFETCAS_CORE_H
 #define SFETCAS_CORE_H
 
-#define SF_VERSION 4
+#define SF_VERSION 5
 
 #ifdef _WIN32
 #define SF_PUBLIC __declspec(dllexport)
@@ -308,5 +308,62 @@ SF_PUBLIC int sf_follow(const sf_model *model, sf_system *system, sf_way *way, c
 SF_PUBLIC int sf_solve_cases(const sf_model *model, sf_system *system, sf_cases *cases, const sf_way *way,
                              const sf_limits *limits, const sf_limits *near_limits, const sf_count_of *count,
                              sf_point *point, double *memory);
+
+/* ---- steps of motions -------------------------------------------------------------------------------- */
+
+#define SF_STAGES 4 /* stages of a method at most */
+#define SF_KEPT 4   /* rates that a method keeps from step to step at most */
+
+/* Quantities of one kind that carry mass or are damped: rows of terms, whose multipliers are the forces. */
+typedef struct {
+  sf_group group;
+  const double *mass, *damping; /* (terms, rows) */
+} sf_observables;
+
+/* Motions of a model of all stages of a step: copies of everything, stage after stage within each part.
+ *
+ * Quantities are linear ones, then those of the observables.  Of what moved by X - X_0 since the begin of a step of
+ * length h, and of the rates r_k that a method keeps times h^p_k, its numbers give h X', h^2 X'' and the next rates.
+ */
+typedef struct {
+  int stages, kept, quantities, linear, groups; /* quantities of one stage, of them linear; groups of observables */
+  const int *part;                  /* (groups + 2,) where the parts of the quantities of one stage begin */
+  const double *at;                 /* (stages,) places of the stages in a step, over its length */
+  const double *velocity, *acceleration, *after;                /* (stages, stages) twice, (kept, stages) */
+  const double *velocity_kept, *acceleration_kept, *after_kept; /* (stages, kept) twice, (kept, kept) */
+  const int *power;                 /* (kept,) p: 1 or 2 */
+  const sf_group *turning;          /* tangents of elements, turned */
+  const double *tangent;            /* (elements, points, axes) undeformed ones */
+  const sf_group *seen, *rows;      /* values of the observables; of the rows of the model's groups */
+  const sf_observables *observables;
+  sf_map by_place, by_tangent, onto_pull, onto_places, mass, drag;
+  sf_sums shares, entries;
+  int couples;                      /* where what the matrix has beside results of terms begins */
+  int massive;                      /* elements of one stage whose inner nodes have mass or drag */
+  const int *inside, *point_of;     /* (massive,) their numbers; point of each column of their derivatives */
+  const double *inner_mass, *inner_drag, *first_mass, *first_drag; /* (massive, points, points) and (massive, points) */
+  int masses, drags;
+  const double *place_mass, *place_drag; /* entries of their matrices */
+  int entry_count, iterations;
+  int driven;
+  const int *drive;                 /* (driven,) numbers of rotations that are prescribed */
+  double dual, last_change, lost;
+} sf_motion;
+
+/* One step: what it begins from, what is given at its stages, and what it found. */
+typedef struct {
+  double h, ratio;                  /* its length, over that of the step before; 0 for a restart */
+  const double *given, *vector;     /* of all stages: (given,), (driven, 3) */
+  const double *q, *y, *lam, *turn, *shift, *x, *rate; /* at the begin; lam for all stages; of the stages of the last */
+  double *unwrapped;                /* values near which angles are counted */
+  const double *acting, *held;      /* (rows,) whether rows of all stages act, and at which values; NULL: all, at 0 */
+  double *last_q, *last_y, *rows, *turns, *shifts, *there, *rates;
+  double size, gap;
+  int iterations;
+} sf_advance_of;
+
+SF_PUBLIC int sf_advance_size(const sf_model *model, const sf_motion *motion);
+SF_PUBLIC int sf_advance(const sf_model *model, const sf_motion *motion, sf_system *system, sf_advance_of *step,
+                         sf_point *point, double *memory);
 
 #endif

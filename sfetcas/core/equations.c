@@ -55,13 +55,19 @@ int sf_work_size(const sf_model *m) { return sf_divide(m, NULL, NULL); }
 
 #include "terms.h"
 
+/* Displacements of retained places. */
+static void sf_places(const sf_model *m, const sf_state *s, const double *given, sf_point *p) {
+  int k;
+  sf_times(&m->Y, s->y, p->place, 0);
+  for (k = 0; k < m->places * m->axes; ++k) p->place[k] += given[m->shift + k];
+}
+
 /* Displacements of retained places, whole pulls of elements, and the results of all terms. */
 int sf_evaluate(const sf_model *m, const sf_state *s, const double *given, sf_point *p) {
   sf_work work;
   int e, k, a, g, axes = m->axes;
   sf_divide(m, p->work, &work);
-  sf_times(&m->Y, s->y, p->place, 0);
-  for (k = 0; k < m->places * axes; ++k) p->place[k] += given[m->shift + k];
+  sf_places(m, s, given, p);
   sf_times(&m->ZT, s->lam, work.constant, 0);
   for (e = 0; e < m->elements; ++e) {
     const double *constant = work.constant + (size_t)m->owner[e] * axes;
@@ -71,7 +77,7 @@ int sf_evaluate(const sf_model *m, const sf_state *s, const double *given, sf_po
         p->pull[at] = given[m->pull + at] + constant[a];
       }
   }
-  for (g = 0; g < m->groups; ++g) sf_terms(m, g, s, given, p, &work);
+  for (g = 0; g < m->groups; ++g) sf_terms(m, m->group + g, g == 0, s, given, p, &work);
   p->result[m->results - 1] = 1.0;
   return 0;
 }
@@ -192,7 +198,7 @@ int sf_slope(const sf_model *m, const sf_state *s, const double *rate, const sf_
   for (i = 0; i < m->results; ++i) results[i] = 0.0;
   there.result = results;
   for (g = 1; g < m->groups; ++g)
-    if (m->group[g].proportional && m->group[g].loads) sf_terms(m, g, s, rate, &there, &work);
+    if (m->group[g].proportional && m->group[g].loads) sf_terms(m, m->group + g, 0, s, rate, &there, &work);
   /* Forces at places pull at all segments that lead there. */
   for (e = 0; e < m->elements; ++e) {
     const sf_group *group = m->group;

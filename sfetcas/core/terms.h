@@ -38,9 +38,8 @@ static void sf_gather(const sf_model *m, const sf_group *group, int element, int
 #undef PUT
 }
 
-static void sf_terms(const sf_model *m, int number, const sf_state *s, const double *given, sf_point *p,
-                     const sf_work *work) {
-  const sf_group *group = m->group + number;
+static void sf_terms(const sf_model *m, const sf_group *group, int element, const sf_state *s, const double *given,
+                     sf_point *p, const sf_work *work) {
   const sf_tape *tape = group->tape;
   int first, lanes, l;
   for (first = 0; first < group->terms; first += lanes) {
@@ -48,7 +47,7 @@ static void sf_terms(const sf_model *m, int number, const sf_state *s, const dou
     lanes = sf_lanes(tape, left);
     left = left < lanes ? left : lanes;
     for (l = 0; l < lanes; ++l)
-      sf_gather(m, group, number == 0, first + (l < left ? l : left - 1), s, given, p, work, work->in + l, lanes);
+      sf_gather(m, group, element, first + (l < left ? l : left - 1), s, given, p, work, work->in + l, lanes);
     sf_lanes_run(lanes, tape, work->in, p->result + group->result + (size_t)first * tape->results, left, work->slots);
   }
 }

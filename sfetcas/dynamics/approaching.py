@@ -29,9 +29,10 @@ from ..mechanics.fields import Fields
 from ..mechanics.mesh import Approach
 from ..mechanics.model import Model
 from .events import LOOKED, Events
-from .integrating import SHORTEST, Memory, Passed, Stepper, Taken
+from .integrating import SHORTEST, Passed, Stepper
 from .motion import Mover
 from .stages import StageEquations
+from .taken import Memory, Taken
 
 __all__ = ["Approaching"]
 

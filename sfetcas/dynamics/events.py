@@ -44,8 +44,9 @@ from ..mechanics.rubbing import STILL, Rubs
 from ..mechanics.spots import thinnest
 from ..mechanics.unilateral import Unilateral
 from .impacts import Collision, Impacts
-from .integrating import SHORTEST, Memory, Passed, Stepper, Taken
+from .integrating import SHORTEST, Passed, Stepper
 from .sampling import turned_by
+from .taken import Memory, Taken
 
 __all__ = ["LOOKED", "TOGETHER", "Event", "Events"]
 
@@ -374,7 +375,7 @@ class Events:
         if len(taken.places) == 1 and last is not None:
             # One stage alone makes a line.
             nodes = np.array([-last.h / taken.h, *nodes])
-            before = last.turns[-1:], last.shifts[-1:], last.x[-1:] - last.begin.x
+            before = last.turns[-1:], last.shifts[-1:], last.x[-1:] - last.x[0]
             parts = [np.concatenate([-one, part]) for one, part in zip(before, parts, strict=True)]
         row = evaluation(nodes, np.array([share]))[0]
         turned, shift, moved = (np.einsum("n,n...->...", row, part) for part in parts)

@@ -27,9 +27,9 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import TINY, Array, Index
 from ..mathematics.complementarity import by_pivots
 from ..mechanics.equations import State
-from .integrating import Memory
 from .rough_impacts import Rough, rough_impulses
 from .stages import StageEquations
+from .taken import Memory
 
 __all__ = ["Collision", "Impacts"]
 

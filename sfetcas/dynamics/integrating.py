@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Protocol
 
+import casadi as ca
 import numpy as np
 
 from .. import tolerances
@@ -17,12 +18,13 @@ from ..mathematics.kernels import Batch
 from ..mechanics.masses import Observables
 from ..mechanics.rubbing import Rubs
 from ..mechanics.segments import pulled_place
-from ..mechanics.unilateral import NONE, UnilateralRows
+from .core_steps import core_step
 from .methods import Method, Radau
 from .stages import StageEquations
-from .steps import LAST_CHANGE, step_function
+from .steps import step_function
+from .taken import Before, Memory, Taken
 
-__all__ = ["LONGER", "SHORTEST", "Memory", "Passed", "Stepper", "Taken", "Watching", "integrate"]
+__all__ = ["LONGER", "SHORTEST", "Passed", "Stepper", "Watching", "integrate"]
 
 
 SHORTEST = 5e-7
@@ -30,118 +32,6 @@ SHORTEST = 5e-7
 
 It dies away from step to step then; of a tenth of this step it is much of what accelerates, and grows.
 """
-
-
-@dataclass(frozen=True, eq=False)
-class Memory:
-    """The state that is passed from step to step, dimensionless.
-
-    Attributes
-    ----------
-    t : float
-    q : ndarray (rotations, components)
-        Quaternions or angles.
-    y, lam : ndarray
-        Displacement unknowns, multipliers.
-    x : ndarray (quantities,)
-        The quantities that carry mass or are damped, see :mod:`~sfetcas.mechanics.observed`.
-    rates : ndarray (kept, quantities)
-        Their rates that the method keeps, velocities first.
-    unwrapped : ndarray
-        Values of the angles that count turns.
-    origin : tuple of ndarray
-        Offsets of ``y`` and ``x``, moved along with a structure that flies far, so that no digits are lost.
-    last : Taken or None
-        The step before; None after a restart.
-    remembered : ndarray
-        What members remember, see :class:`~sfetcas.mechanics.memory.Remembering`.
-    acting : ndarray
-        For each unilateral constraint of the system whether it acts, 1 or 0.
-    held : ndarray
-        The values of their rows at which those hold that act: next to zero, unless they began to act late.
-    lost : float
-        Energy lost in impacts, and by friction at obstacles, so far.
-    rubs : Rubs or None
-        What the places that rub on obstacles do; None where there are none.
-    unilateral : UnilateralRows
-        The constraints of ``acting``, which change where members come near to each other.
-    """
-
-    t: float
-    q: Array
-    y: Array
-    lam: Array
-    x: Array
-    rates: Array
-    unwrapped: Array
-    origin: tuple[Array, Array] = (np.zeros(1), np.zeros(1))
-    last: Taken | None = None
-    remembered: Array = field(default_factory=lambda: np.zeros(0))
-    acting: Array = field(default_factory=lambda: np.zeros(0))
-    held: Array = field(default_factory=lambda: np.zeros(0))
-    lost: float = 0.0
-    rubs: Rubs | None = None
-    unilateral: UnilateralRows = NONE
-
-    @property
-    def position(self) -> Array:
-        """The quantities without the offset of ``origin``, (quantities,)."""
-        return self.x + self.origin[1]
-
-    def moved(self, y: Array, x: Array) -> Memory:
-        """The same state with the offsets of displacements and quantities increased by ``y`` and ``x``."""
-        return replace(self, y=self.y - y, x=self.x - x, origin=(self.origin[0] + y, self.origin[1] + x))
-
-
-@dataclass(frozen=True, eq=False)
-class Taken:
-    """A time step that was taken, dimensionless.
-
-    Attributes
-    ----------
-    begin, after : Memory
-        The state before and after it.
-    h : float
-        Its length.
-    places : ndarray (stages,)
-        Positions of the stages in the step, as fractions of h; the last one is 1.
-    turns : ndarray (stages, rotations, turns)
-        Rotation vectors since its begin.
-    shifts : ndarray (stages, displacements)
-        Changes of the displacements since its begin.
-    x : ndarray (stages, quantities)
-    lam : ndarray (stages, multipliers)
-    size : float
-        Largest change in the last Newton iteration.
-    iterations : int
-    gap : float
-        Largest gap of the constraints at its end.
-    rubbed : ndarray (n,)
-        What friction at obstacles has taken away since its begin at :attr:`rubbed_at`; empty where nothing rubs.
-    """
-
-    begin: Memory
-    after: Memory
-    h: float
-    places: Array
-    turns: Array
-    shifts: Array
-    x: Array
-    lam: Array
-    size: float
-    iterations: int
-    gap: float
-    rubbed: Array = field(default_factory=lambda: np.zeros(0))
-
-    @property
-    def rubbed_at(self) -> Array:
-        """The stages as fractions of h; where there is but one also the middle."""
-        return self.places if len(self.places) > 1 else np.array([0.5, 1.0])
-
-    @property
-    def converged(self) -> bool:
-        """Whether Newton's method has converged in this step."""
-        return self.size <= LAST_CHANGE
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,14 +77,22 @@ class Stepper:
 
     def __init__(self, system: StageEquations, method: Method) -> None:
         self.system, self.method = system, method
-        self.function = step_function(system, method)
+        self._by_core = core_step(system, method)
         # Tensions are no positions: their rates, which nothing resists, may be those of rounding.
         positions, axes = np.ones(system.linear), system.axes
         positions[(axes * system.model.segments.of_tendons[:, None] + np.arange(axes)).ravel()] = 0.0
         self.judged = np.concatenate([positions, *map(_arms, system.masses.observables)])
-        self._batch = Batch(self.function, 1)
         self.time = system.masses.time
         self.count = 0
+
+    @functools.cached_property
+    def function(self) -> ca.Function:
+        """A step as a CasADi function, see :func:`~sfetcas.dynamics.steps.step_function`."""
+        return step_function(self.system, self.method)
+
+    @functools.cached_property
+    def _batch(self) -> Batch:
+        return Batch(self.function, 1)
 
     def step(self, memory: Memory, h: float) -> Taken:
         """The step of length h, dimensionless, from a state; see :attr:`Taken.converged`."""
@@ -205,26 +103,16 @@ class Stepper:
         factors = np.array([system.factors(t) for t in times])
         turns = np.zeros((stages, n.rotations, system.turns)) if last is None else last.turns
         shifts = np.zeros((stages, n.y)) if last is None else last.shifts
-        ratio = np.array([0.0 if last is None else h / last.h])
-        rubs = [] if memory.rubs is None else [memory.rubs.flat]
-        counted = np.concatenate(
-            [memory.unwrapped, memory.remembered[: system.memory.size], *rubs, memory.acting, memory.held]
-        )
-        given = (memory.q, memory.y, memory.lam, turns, shifts, memory.x, memory.rates)
-        for i, values in enumerate((*given, ratio, np.array([h]), factors, counted)):
-            if values.size:
-                self._batch.set(i, values)
-        # Stopped by a matrix without an inverse, a step leaves no numbers.
-        for result in self._batch.results:
-            result[...] = np.nan
-        q, y, lam, turns, shifts, x, rates, size, iterations, gap = (part.ravel().copy() for part in self._batch())
+        ratio = 0.0 if last is None else h / last.h
+        take = self._by_core or self._by_function
+        q, y, lam, turns, shifts, x, rates, size, iterations, gap = take(memory, h, ratio, factors, turns, shifts)
         self.count += 1
         q, lam, x = q.reshape(n.rotations, -1), lam.reshape(stages, n.lam), x.reshape(stages, n.x)
         unwrapping, unwrapped, remembered = system.model.unwrapping, memory.unwrapped, memory.remembered
         unwrapped = unwrapping.angles(q, unwrapped) if unwrapping.count else unwrapped
         # All stages of a step know what was remembered at its begin; its end is remembered by the next one.
         remembered = system.memory.after(q, y, remembered) if system.memory.size else remembered
-        kept = rates.reshape(method.kept, n.x)
+        turns, shifts = turns.reshape(stages, n.rotations, -1), shifts.reshape(stages, n.y)
         after = replace(
             memory,
             t=memory.t + h,
@@ -232,17 +120,33 @@ class Stepper:
             y=y,
             lam=lam[-1],
             x=x[-1],
-            rates=kept,
+            rates=rates.reshape(method.kept, n.x),
             unwrapped=unwrapped,
-            last=None,
+            last=Before(h, turns, shifts, np.vstack([memory.x, x]), memory.rates[0]),
             remembered=remembered,
         )
         change = float(size[0]) if np.isfinite(x).all() else np.inf
-        parts = turns.reshape(stages, n.rotations, -1), shifts.reshape(stages, n.y), x, lam
+        parts = turns, shifts, x, lam
         taken = Taken(memory, after, h, method.places, *parts, change, int(np.nan_to_num(iterations[0])), float(gap[0]))
         if memory.rubs is not None and np.isfinite(change):
             taken = self._rubbed(taken, memory.rubs)
-        return self._nearby(replace(taken, after=replace(taken.after, last=taken)))
+        return self._nearby(taken)
+
+    def _by_function(
+        self, memory: Memory, h: float, ratio: float, factors: Array, turns: Array, shifts: Array
+    ) -> tuple[Array, ...]:
+        """A step where the core takes none, as of :class:`~sfetcas.dynamics.core_steps.CoreStep`."""
+        rubs = [] if memory.rubs is None else [memory.rubs.flat]
+        remembered = memory.remembered[: self.system.memory.size]
+        counted = np.concatenate([memory.unwrapped, remembered, *rubs, memory.acting, memory.held])
+        given = (memory.q, memory.y, memory.lam, turns, shifts, memory.x, memory.rates)
+        for i, values in enumerate((*given, np.array([ratio]), np.array([h]), factors, counted)):
+            if values.size:
+                self._batch.set(i, values)
+        # Stopped by a matrix without an inverse, a step leaves no numbers.
+        for result in self._batch.results:
+            result[...] = np.nan
+        return tuple(part.ravel().copy() for part in self._batch())
 
     def _rubbed(self, taken: Taken, rubs: Rubs) -> Taken:
         """The step with what friction took, and with the directions of sliding at its end."""
@@ -279,9 +183,7 @@ class Stepper:
         if not far.any():
             return taken
         y, x = by_y @ far, by_x @ far
-        begin, after = taken.begin.moved(y, x), replace(taken.after.moved(y, x), last=None)
-        near = replace(taken, begin=begin, after=after, x=taken.x - x)
-        return replace(near, after=replace(after, last=near))
+        return replace(taken, begin=taken.begin.moved(y, x), after=taken.after.moved(y, x), x=taken.x - x)
 
     def predicted(self, memory: Memory, h: float) -> Array:
         """Quantities (quantities,) after a step of length h, extrapolated from the step before, dimensionless."""
@@ -289,12 +191,12 @@ class Stepper:
         assert last is not None
         if self.method.stages == 1:
             velocity = memory.rates[0]
-            mean = (velocity - last.begin.rates[0]) / last.h
+            mean = (velocity - last.velocity) / last.h
             acceleration = memory.rates[2] if self.method.kept > 1 else mean
             return np.asarray(memory.x + h * velocity + 0.5 * h * h * acceleration)
         nodes = np.array([0.0, *self.method.places])
         row = evaluation(nodes, 1.0 + h / last.h)[0]
-        return np.asarray(row @ np.vstack([last.begin.x, last.x]))
+        return np.asarray(row @ last.x)
 
     def refreshed(self, memory: Memory, h: float) -> Memory:
         """The state for a restart: accelerations, where the method keeps them, are those just after the kink."""

@@ -14,10 +14,11 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import State
 from .approaching import Approaching
 from .events import Event, Events
-from .integrating import LONGER, SHORTEST, Memory, Stepper, Taken, integrate
+from .integrating import LONGER, SHORTEST, Stepper, integrate
 from .methods import Method
 from .sampling import Sample, Sampler, StepRecord
 from .stages import StageEquations
+from .taken import Memory, Taken
 
 __all__ = ["InitialState", "Integrator", "Stages", "TimeGrid"]
 

@@ -21,7 +21,7 @@ from ..mathematics.arrays import Array, unit
 from ..mathematics.interpolation import differentiation, evaluation
 from ..mechanics.rubbing import Rubs
 from ..mechanics.unilateral import NONE, UnilateralRows
-from .integrating import Memory, Taken
+from .taken import Memory, Taken
 
 __all__ = ["Sample", "Sampler", "StepRecord", "between", "turned_by"]
 
@@ -56,7 +56,7 @@ class Sample:
     remembered : ndarray
         What members remember at the begin of the step in which it is.
     acting : ndarray
-        Which unilateral constraints act, see :class:`~sfetcas.dynamics.integrating.Memory`.
+        Which unilateral constraints act, see :class:`~sfetcas.dynamics.taken.Memory`.
     lost : float
         Energy lost in impacts, and by friction at obstacles, so far.
     rubs : Rubs or None

@@ -132,11 +132,11 @@ class StageEquations(System):
 
     def static_matrix(self, stage: _Stage) -> ca.MX:
         """Derivative (total, total) of a stage's residual by its unknowns for given inertia and damping forces."""
-        return summed((self.total,) * 2, self.tables.tied(self._probe.static), stage.entries)
+        return summed((self.total,) * 2, self.tables.tied(self.entry_places.static), stage.entries)
 
     def coupling_matrix(self, stage: _Stage, c: float, b: float) -> ca.MX:
         """Its derivative (total, total) where rates are multiplied by c and accelerations by b: ``c D + b M``."""
-        return summed((self.total,) * 2, self._probe.coupled.places, stage.coupled(stage, ca.MX(c), ca.MX(b)))
+        return summed((self.total,) * 2, self.entry_places.coupled.places, stage.coupled(stage, ca.MX(c), ca.MX(b)))
 
     def momenta(self, q: ca.MX, y: ca.MX, factors: ca.MX, unwrapped: ca.MX, v: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
         """Jacobian (rows, unknowns) of the rows, masses (unknowns, unknowns), and the momenta (unknowns,) of rates v
@@ -150,12 +150,13 @@ class StageEquations(System):
         return rows, mass, (moving.residual - resting.residual)[:unknowns]
 
     @functools.cached_property
-    def _probe(self) -> StagePlaces:
+    def entry_places(self) -> StagePlaces:
+        """Positions of its matrix entries."""
         return StagePlaces(self)
 
     def _system(self, stages: int) -> Pattern:
         """Pattern of the matrix of all stages, unknown by unknown, each with its stages."""
-        probe = self._probe
+        probe = self.entry_places
         static = self.tables.tied(probe.static)
         one, coupled = probe.static.count, probe.coupled.places
         rows, columns = (np.concatenate([static[k], coupled[k], np.arange(self.total)]) for k in (0, 1))

@@ -15,7 +15,7 @@ from ..mechanics.expressions import Given, moved_by
 from .methods import Begin, Method
 from .stages import StageEquations
 
-__all__ = ["ITERATIONS", "LAST_CHANGE", "guessed", "repeated", "step_function"]
+__all__ = ["ITERATIONS", "LAST_CHANGE", "LOST", "guessed", "repeated", "step_function"]
 
 ITERATIONS = 10
 """Iterations of Newton's method at most."""

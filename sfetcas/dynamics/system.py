@@ -21,7 +21,8 @@ from ..mathematics.kernels import Kernels
 from ..mathematics.linear import SparseMap
 from ..mathematics.quaternion import cross_matrix
 from ..mechanics import expressions
-from ..mechanics.equations import Equations, State
+from ..mechanics.batches import GroupBatch
+from ..mechanics.equations import Equations, State, turned_tangents
 from ..mechanics.expressions import Expressions, Given, moved_by
 from ..mechanics.loading import Loading
 from ..mechanics.masses import Masses, Observables
@@ -127,17 +128,15 @@ class System(Expressions):
         self._moving = (self.turns, axes) if self.model.element.strains else (self.turns,)
         width = sum(self._moving) * self.points
         self.massive_columns = (self.massive[:, None] * width + np.arange(width)).ravel().tolist()
+        self.points_of_columns = np.concatenate([np.repeat(np.arange(self.points), width) for width in self._moving])
         arms = self._up_to
-        shares = [
+        self.inner_shares = [
             np.einsum("ek,kj,kl->elj", part[self.massive], arms, arms) for part in (masses.inner, masses.inner_drag)
         ]
-        self.inner = [share.reshape(-1, self.points).T for share in shares]
-        firsts = [part[self.massive] @ arms for part in (masses.inner, masses.inner_drag)]
+        self.inner = [share.reshape(-1, self.points).T for share in self.inner_shares]
+        self.first_shares = [part[self.massive] @ arms for part in (masses.inner, masses.inner_drag)]
         # One for each component of what moves: by axes, components of a point, points, elements.
-        self.firsts = [
-            np.concatenate([np.repeat(first, width * axes, axis=1) for width in self._moving], axis=1).ravel()
-            for first in firsts
-        ]
+        self.firsts = [np.repeat(first[:, self.points_of_columns], axes, axis=1).ravel() for first in self.first_shares]
         sizes = [group.kind.sizes[2] * len(group.data) for group in masses.observables]
         bounds = np.cumsum([self.linear, *sizes]).tolist()
         self.ranges = list(zip(bounds, bounds[1:], strict=False))
@@ -254,8 +253,23 @@ class System(Expressions):
 
     def rates(self, state: State, factors: Array, step: Array) -> tuple[Array, Array]:
         """Quantities (quantities,) at a state, and their rates for the rates ``step`` (unknowns,) of the unknowns."""
+        if not step.any():
+            return self.seen(state, factors), np.zeros(self.layout.x)
         x, v = self._rated(self.interpreted.along_step, state, factors, step, np.zeros(self.layout.factors))
         return x, v
+
+    def seen(self, state: State, factors: Array) -> Array:
+        """Quantities (quantities,) at a state, as of :meth:`moving`, in numbers."""
+        equations, loading = self.equations, self.loading(factors)
+        places = equations.places(state, loading)
+        parts = [mapped(self.by_place) @ places]
+        if self.elements:
+            gained = turned_tangents(self.model, state) - self.model.beams.tangent
+            parts[0] = parts[0] + mapped(self.by_tangent) @ gained.ravel()
+        for group in self.masses.observables:
+            batch = GroupBatch(self.model, group, rows_of(group.kind), self.angles_of(group))
+            parts.append(batch(state.q, places.reshape(-1, self.axes), state.unwrapped)[0].ravel())
+        return np.concatenate(parts)
 
     def rates_in_time(
         self, state: State, factors: Array, step: Array, faster: Array

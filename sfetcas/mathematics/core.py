@@ -22,6 +22,7 @@ from .kernels import cache_folder, private
 from .tapes import KEPT, NAMES, Tape
 
 __all__ = [
+    "Advance",
     "Border",
     "Cases",
     "Counting",
@@ -31,6 +32,8 @@ __all__ = [
     "Limits",
     "Map",
     "Model",
+    "Motion",
+    "Observables",
     "Pivoted",
     "Point",
     "Report",
@@ -271,14 +274,59 @@ class Sought(ctypes.Structure):
     _fields_ = (*((name, _int) for name in ("status", "negative", "iterations")), ("residual", _double))
 
 
+class Observables(ctypes.Structure):
+    """``sf_observables``."""
+
+    _fields_ = (("group", Group), ("mass", _pointer), ("damping", _pointer))
+
+
+class Motion(ctypes.Structure):
+    """``sf_motion``."""
+
+    _fields_ = (
+        *((name, _int) for name in ("stages", "kept", "quantities", "linear", "groups")),
+        *((name, _pointer) for name in ("part", "at", "velocity", "acceleration", "after")),
+        *((name, _pointer) for name in ("velocity_kept", "acceleration_kept", "after_kept", "power", "turning")),
+        *((name, _pointer) for name in ("tangent", "seen", "rows", "observables")),
+        *((name, Map) for name in ("by_place", "by_tangent", "onto_pull", "onto_places", "mass", "drag")),
+        *((name, Sums) for name in ("shares", "entries")),
+        *((name, _int) for name in ("couples", "massive")),
+        *((name, _pointer) for name in ("inside", "point_of", "inner_mass", "inner_drag", "first_mass", "first_drag")),
+        *((name, _int) for name in ("masses", "drags")),
+        *((name, _pointer) for name in ("place_mass", "place_drag")),
+        *((name, _int) for name in ("entry_count", "iterations", "driven")),
+        ("drive", _pointer),
+        *((name, _double) for name in ("dual", "last_change", "lost")),
+    )
+
+
+class Advance(ctypes.Structure):
+    """``sf_advance_of``."""
+
+    _fields_ = (
+        *((name, _double) for name in ("h", "ratio")),
+        *((name, _pointer) for name in ("given", "vector", "q", "y", "lam", "turn", "shift", "x", "rate")),
+        *((name, _pointer) for name in ("unwrapped", "acting", "held")),
+        *((name, _pointer) for name in ("last_q", "last_y", "rows", "turns", "shifts", "there", "rates")),
+        *((name, _double) for name in ("size", "gap")),
+        ("iterations", _int),
+    )
+
+
 OF_WAYS = (Counting, Way, Cases, Rules, Sought, Inputs)
 
 HANDED = (TapeTable, Group, Model, Point, Factors, Pivoted, System, Limits, Border, Report, *OF_WAYS)
 
-SIZES = (12, *(ctypes.sizeof(kind) for kind in HANDED), 8, len(NAMES))
+SIZES = (
+    12,
+    *(ctypes.sizeof(kind) for kind in HANDED),
+    8,
+    *map(ctypes.sizeof, (Observables, Motion, Advance)),
+    len(NAMES),
+)
 """What the core says of the sizes of what is handed to it, if it is the one that this module was written for."""
 
-VERSION = 4
+VERSION = 5
 """Number of the interface, as ``SF_VERSION``."""
 
 
@@ -373,5 +421,7 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL | None:
     library.sf_solve_cases.argtypes = [_pointer] * 9
     library.sf_find_size.argtypes = [_pointer] * 3
     library.sf_find.argtypes = [*[_pointer] * 5, _int, *[_pointer] * 4]
+    library.sf_advance_size.argtypes = [_pointer] * 2
+    library.sf_advance.argtypes = [_pointer] * 6
     library.sf_solve.argtypes = [_pointer, _pointer, _int, _pointer, _pointer, _pointer]
     return library

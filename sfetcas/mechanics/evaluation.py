@@ -17,14 +17,27 @@ from typing import Any
 import numpy as np
 
 from ..mathematics import core as c
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, Index
 from ..mathematics.linear import NO_ROOM, CoreSystem, SparseMap
-from ..mathematics.tapes import tape_of
+from ..mathematics.tapes import Tape, tape_of
 from .layout import Layout
 from .model import Model
+from .tables import Acting
 from .terms import rotation_gradient
 
-__all__ = ["UNLOADED", "CoreModel", "CorePoint", "Handed", "Parts", "Search", "core_model", "handed"]
+__all__ = [
+    "UNLOADED",
+    "CoreLayout",
+    "CoreModel",
+    "CorePoint",
+    "Handed",
+    "Parts",
+    "Search",
+    "cells",
+    "core_layout",
+    "core_model",
+    "handed",
+]
 
 UNLOADED = 1e-6
 """Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
@@ -45,10 +58,16 @@ def core_model(layout: Layout, model: Model, noise: Array) -> CoreModel | None:
 
 def handed(layout: Layout, model: Model, noise: Array) -> Handed | None:
     """The model as the core takes it; None where a kind of term has operations that it does not know."""
-    if layout.of_core is None:
-        layout.of_core = CoreLayout(layout, model)
-    found: CoreLayout = layout.of_core
+    found = core_layout(layout, model)
     return Handed(found, model, noise) if found.known else None
+
+
+def core_layout(layout: Layout, model: Model, copies: int = 1) -> CoreLayout:
+    """What the core takes of the structure of a model, or of so many copies of it beside each other."""
+    found: CoreLayout | None = layout.of_core.get(copies)
+    if found is None:
+        found = layout.of_core[copies] = CoreLayout(layout, model, copies)
+    return found
 
 
 class CorePoint:
@@ -92,6 +111,15 @@ class CorePoint:
 class CoreLayout:
     """What the core takes that follows from the structure of a model alone, see :class:`~.layout.Layout`.
 
+    Copies stand beside each other within each part: all rotations, then all displacements, and so on.
+
+    Parameters
+    ----------
+    layout : Layout
+    model : Model
+    copies : int
+        Of how many copies of the model; of several the core is not told of which contributions the matrix is the sum.
+
     Attributes
     ----------
     known : bool
@@ -108,16 +136,18 @@ class CoreLayout:
         Where the results of each group begin.
     """
 
-    def __init__(self, layout: Layout, model: Model) -> None:
-        self._layout, self._tables = layout, layout.tables
+    def __init__(self, layout: Layout, model: Model, copies: int = 1) -> None:
+        self._layout, self._tables, self.copies = layout, layout.tables, copies
         tapes = [tape_of(rotation_gradient(group.kind)) for group in model.terms]
         self.tapes = [tape for tape in tapes if tape is not None]
         self.known, self._element = len(self.tapes) == len(tapes), model.element if len(model.terms[0].data) else None
         self.arrays: dict[int, Any] = {}
         self.tables = list[c.TapeTable]()
+        self._rotations, self._places = len(model.rotations.kind), len(model.segments.places)
+        self._closings = len(model.positions.rows)
         if self.known:
             self._terms = [len(group.data) for group in model.terms]
-            sizes = (n * tape.results for n, tape in zip(self._terms, self.tapes, strict=True))
+            sizes = (copies * n * tape.results for n, tape in zip(self._terms, self.tapes, strict=True))
             self.begins = np.cumsum([0, *sizes])
             self._make(model)
 
@@ -137,117 +167,214 @@ class CoreLayout:
         """Whether the globalised Newton method can be run by the core."""
         return self._element is None or self.convex is not None
 
+    # -- numbers in copies --------------------------------------------------------------------------------
+
+    def copied(self, numbers: Index, size: int) -> Index:
+        """Numbers (n, ...) of some of ``size`` things, those of all copies one after the other; -1 is none."""
+        if self.copies == 1:
+            return numbers
+        shift = size * np.arange(self.copies).reshape(-1, *[1] * numbers.ndim)
+        return self._flat(np.where(numbers < 0, -1, numbers + shift))
+
+    def lines(self, numbers: Index) -> Index:
+        """The same of multipliers: closings stand before all other rows."""
+        return self.blocks(numbers, [0, self._closings, self._tables.rows])
+
+    def unknowns(self, numbers: Index) -> Index:
+        """The same of unknowns and multipliers."""
+        tables = self._tables
+        ends = [tables.rotation_unknowns, tables.unknowns, tables.unknowns + self._closings, tables.total]
+        return self.blocks(numbers, [0, *ends])
+
+    def blocks(self, numbers: Index, bounds: Sequence[int]) -> Index:
+        """The same of things that stand in blocks with these bounds, each with all of its copies."""
+        if self.copies == 1:
+            return numbers
+        begins, sizes = np.array(bounds[:-1]), np.diff(bounds)
+        block = np.clip(np.searchsorted(begins, numbers, side="right") - 1, 0, None)
+        first, size = begins[block], sizes[block]
+        number = np.arange(self.copies).reshape(-1, *[1] * numbers.ndim)
+        found = self.copies * first + number * size + (numbers - first)
+        return self._flat(np.where(numbers < 0, -1, found))
+
+    @staticmethod
+    def _flat(values: Index) -> Index:
+        """Values (copies, n, ...) as (copies * n, ...)."""
+        return values.reshape(values.shape[0] * values.shape[1], *values.shape[2:])
+
+    def beside(self) -> CoreLayout:
+        """The same, which keeps what else is made with it for itself."""
+        found = copy.copy(self)
+        found.arrays, found.tables = dict[int, Any](), list[c.TapeTable]()
+        return found
+
+    def repeated(self, values: Array) -> Array:
+        """Values (n, ...) once for each copy."""
+        return np.concatenate([values] * self.copies) if self.copies > 1 else values
+
+    # -- tables -------------------------------------------------------------------------------------------
+
     def _make(self, model: Model) -> None:
         layout, tables, maps, element = self._layout, self._tables, model.positions, model.element
-        places, along = len(model.segments.places), (len(model.segments.owner), element.order + 1)
+        along, n = (len(model.segments.owner), element.order + 1), self.copies
         slides = [np.concatenate([unknown[:, None], rows], axis=1) for unknown, rows in layout.sliding]
+        slide = np.concatenate([np.zeros((0, 1 + element.axes), np.intp), *slides])
+        slide = np.concatenate([self.unknowns(slide[:, :1]), self.lines(slide[:, 1:])], axis=1)
         of_rotations = slice(0, tables.of_places)
         sides, side_of = self._sides()
         given = layout.given
-        begins = {"given": given["force"].stop, **{name: part.start for name, part in given.items()}}
+        begins = {"given": n * given["force"].stop, **{name: n * part.start for name, part in given.items()}}
         self.groups = (c.Group * len(model.terms))(*self._groups(model, begins))
-        angles = model.unwrapping.count
+        angles = model.unwrapping.count if n == 1 else 0
+        pattern = [part if n == 1 else part[:0] for part in (layout.row, layout.column, layout.diagonal)]
+        entries = self.sums(len(layout.row), *self._sources()) if n == 1 else c.Sums(0)
+        unknown = self.unknowns(tables.unknown[of_rotations])
         self.model = c.Model(
             *(int(element.space), element.components, element.turns, element.axes),
-            *(len(model.rotations.kind), places, tables.displacement_unknowns, tables.rows, len(maps.rows), angles),
-            *(tables.unknowns, tables.rotation_unknowns, tables.total),
-            *(*along, len(model.segments.first), len(model.terms)),
+            *(n * self._rotations, n * self._places, n * tables.displacement_unknowns),
+            *(n * tables.rows, n * self._closings, angles),
+            *(n * tables.unknowns, n * tables.rotation_unknowns, n * tables.total),
+            *(n * along[0], along[1], n * len(model.segments.first), len(model.terms)),
             None,
-            self._kept(c.integers(model.segments.owner)),
+            self.kept(c.integers(self.copied(model.segments.owner, len(model.segments.first)))),
             None,
-            *(self._map(one) for one in (maps.Y, maps.Z, maps.Z.T, maps.W, maps.W.T)),
-            *(self._map(one.T.absolute) for one in (maps.W, maps.Y)),
+            *(self.map(one) for one in (maps.Y, maps.Z, maps.Z.T, maps.W, maps.W.T)),
+            *(self.map(one.T.absolute) for one in (maps.W, maps.Y)),
             *(begins[name] for name in ("given", "pull", "shift", "opening", "beside", "force")),
             int(self.begins[-1]) + 1,
-            self._sums(len(layout.row), *self._sources()),
+            entries,
             sides,
             sides,
             side_of,
             None,
-            len(layout.retained),
-            self._kept(c.integers(layout.retained)),
-            sum(len(part) for part in slides),
-            self._kept(c.integers(np.concatenate([np.zeros((0, 1 + element.axes)), *slides]))),
+            n * len(layout.retained),
+            self.kept(c.integers(self.unknowns(layout.retained))),
+            len(slide),
+            self.kept(c.integers(slide)),
             UNLOADED,
-            self._kept(c.integers(tables.unknown[of_rotations])),
-            self._kept(c.doubles(tables.weight[of_rotations])),
+            self.kept(c.integers(unknown)),
+            self.kept(c.doubles(self.repeated(tables.weight[of_rotations]))),
             None,
             None,
-            len(layout.row),
-            *(self._kept(c.integers(part)) for part in (layout.row, layout.column, layout.diagonal)),
+            len(pattern[0]),
+            *(self.kept(c.integers(part)) for part in pattern),
         )
 
-    def _kept(self, array: Array) -> int:
+    def kept(self, array: Array) -> int:
         """Address of an array that lives as long as this."""
         # Of those that begin at one place the longest has all that the others have.
         known = self.arrays.get(address := int(array.ctypes.data))
         self.arrays[address] = array if known is None or known.size < array.size else known
         return address
 
-    def _map(self, matrix: SparseMap) -> c.Map:
-        start = np.searchsorted(matrix.row, np.arange(matrix.shape[0] + 1))
-        parts = (c.integers(start), c.integers(matrix.column), c.doubles(matrix.value))
-        return c.Map(*matrix.shape, *(self._kept(part) for part in parts))
+    def map(self, matrix: SparseMap) -> c.Map:
+        """A matrix for the core, of all copies."""
+        rows, columns = matrix.shape
+        order = np.argsort(matrix.row, kind="stable")
+        row, column = self.copied(matrix.row[order], rows), self.copied(matrix.column[order], columns)
+        start = np.searchsorted(row, np.arange(self.copies * rows + 1))
+        parts = (c.integers(start), c.integers(column), c.doubles(self.repeated(matrix.value[order])))
+        return c.Map(self.copies * rows, self.copies * columns, *(self.kept(part) for part in parts))
 
-    def _sums(self, count: int, onto: Array, source: Array, weight: Array) -> c.Sums:
+    def sums(self, count: int, onto: Array, source: Array, weight: Array) -> c.Sums:
         """Sums of numbers times weights, each onto one of ``count``, in the order in which they are given."""
         order = np.argsort(onto, kind="stable")
         start = np.searchsorted(onto[order], np.arange(count + 1))
         parts = (c.integers(start), c.integers(source[order]), c.doubles(weight[order]))
-        return c.Sums(count, *(self._kept(part) for part in parts))
+        return c.Sums(count, *(self.kept(part) for part in parts))
 
     def _groups(self, model: Model, begins: dict[str, int]) -> Iterator[c.Group]:
         for i, (group, tape) in enumerate(zip(model.terms, self.tapes, strict=True)):
-            table, arrays = c.table_of(tape)
-            self.tables.append(table)
-            self.arrays |= {ctypes.addressof(table): table, **{array.ctypes.data: array for array in arrays}}
             part = model.unwrapping.parts[i]
-            turns, places, rows, data, loads = group.kind.sizes
-            yield c.Group(
-                ctypes.addressof(table),
-                *(len(group.data), turns, places, data, loads, rows if i else 0),
-                *(self._kept(c.integers(one)) for one in (group.turns, group.places)),
-                None,
-                -1 if part is None else part.start,
-                self._kept(c.integers(self._layout.rows[i])),
-                begins[f"loads {i - 1}"] if i else begins["pull"],
-                int(self.begins[i]),
-                *(tape.parts[2], tape.parts[3], tape.parts[5], int(group.kind.proportional)),
+            found = self.group(
+                group,
+                tape,
+                row=self.lines(self._layout.rows[i]),
+                rows=group.kind.sizes[2] if i else 0,
+                loads=group.kind.sizes[4],
+                result=int(self.begins[i]),
             )
+            found.angle = -1 if part is None else self.copies * part.start
+            found.load = begins[f"loads {i - 1}"] if i else begins["pull"]
+            found.proportional = int(group.kind.proportional)
+            yield found
+
+    def group(
+        self, group: Acting, tape: Tape, *, row: Index | None = None, rows: int = 0, loads: int = 0, result: int
+    ) -> c.Group:
+        """Terms of one kind for the core, of all copies, without their data.
+
+        ``row`` (n,) are multipliers, ``rows`` how many of them a term has, ``loads`` how many loads; ``result`` says
+        where its results begin.
+        """
+        table, arrays = c.table_of(tape)
+        self.tables.append(table)
+        self.arrays |= {ctypes.addressof(table): table, **{array.ctypes.data: array for array in arrays}}
+        sides = (self.copied(group.turns, self._rotations), self.copied(group.places, self._places))
+        derivatives = (tape.parts[2], tape.parts[3], tape.parts[5]) if len(tape.parts) > 5 else (0, 0, 0)
+        return c.Group(
+            ctypes.addressof(table),
+            *(self.copies * len(group.data), group.turns.shape[1], group.places.shape[1], group.data.shape[1]),
+            *(loads, rows),
+            *(self.kept(c.integers(part)) for part in sides),
+            None,
+            -1,
+            None if row is None else self.kept(c.integers(row)),
+            0,
+            result,
+            *derivatives,
+            0,
+        )
 
     def _cells(self, number: int, part: int) -> Array:
         """Places (n, width) of a result of a group among all results."""
-        tape = self.tapes[number]
-        rows = self.begins[number] + tape.results * np.arange(self._terms[number])[:, None]
-        return np.asarray(rows + np.arange(tape.parts[part], tape.parts[part + 1]))
+        return cells(self.tapes[number], int(self.begins[number]), self.copies * self._terms[number], part)
 
     def _sources(self) -> tuple[Array, Array, Array]:
         """Contributions to the matrix: entries, the results that they are, and weights."""
-        source, factor, layout = list[Array](), list[Array](), self._layout
-        closed = self._tables.closed
-        for number in range(len(self.tapes)):
-            stiffness, jacobian = (self._cells(number, part).ravel() for part in (4, 5))
+        layout = self._layout
+        places, factors = self.contributions()
+        # Ties are one times their weight; the diagonal alone adds nothing.
+        places, factors = np.append(places, [self.begins[-1], 0]), np.append(factors, [1.0, 0.0])
+        used = layout.entry < len(places) - 1
+        entry = layout.entry[used]
+        return layout.to_entry[used], places[entry], layout.weight[used] * factors[entry]
+
+    def contributions(self, copied: int = 0) -> tuple[Index, Array]:
+        """Which results the contributions of the terms to the matrix are, in the order of the tables, with factors.
+
+        Those of one of the copies.
+        """
+        source, factor, closed = list[Array](), list[Array](), self._tables.closed
+        for number, count in enumerate(self._terms):
+            own = slice(copied * count, (copied + 1) * count)
+            stiffness, jacobian = (self._cells(number, part)[own].ravel() for part in (4, 5))
             value = np.ones(jacobian.size)
             if number == 0:
                 jacobian, value = jacobian[closed.entry], closed.value
             source += [stiffness, jacobian, jacobian]
             factor += [np.ones(stiffness.size), value, value]
-        # Ties are one times their weight; the diagonal alone adds nothing.
-        places = np.concatenate([*source, [self.begins[-1], 0]]).astype(np.intp)
-        factors = np.concatenate([*factor, [1.0, 0.0]])
-        used = layout.entry < len(places) - 1
-        entry = layout.entry[used]
-        return layout.to_entry[used], places[entry], layout.weight[used] * factors[entry]
+        return np.concatenate([np.zeros(0, np.intp), *source]), np.concatenate([np.zeros(0), *factor])
 
     def _sides(self) -> tuple[c.Sums, int]:
         """Sums of moments and forces on the sides of terms onto the unknowns, and the element of each."""
-        layout, first = self._layout, self._tables.sides[0]
-        source = np.concatenate([self._cells(number, 3).ravel() for number in range(len(self.tapes))])
-        element = np.full(len(source), -1)
+        layout, first, n = self._layout, self._tables.sides[0], self.copies
+        source, elements = list[Array](), n * self._terms[0]
+        for number in range(n):
+            parts = (self._cells(i, 3)[number * k : (number + 1) * k] for i, k in enumerate(self._terms))
+            source.append(np.concatenate([part.ravel() for part in parts])[layout.used])
+        element = np.full(sum(part.size for part in self._tables.sides), -1)
         element[: first.size] = np.repeat(np.arange(len(first)), first.shape[1])
-        order = np.argsort(layout.onto, kind="stable")
-        sums = self._sums(self._tables.total, layout.onto, source[layout.used], layout.share)
-        return sums, self._kept(c.integers(element[layout.used][order]))
+        element = self.copied(element[layout.used], elements // n)
+        onto, weight = self.unknowns(layout.onto), self.repeated(layout.share)
+        order = np.argsort(onto, kind="stable")
+        sums = self.sums(n * self._tables.total, onto, np.concatenate(source), weight)
+        return sums, self.kept(c.integers(element[order]))
+
+
+def cells(tape: Tape, begin: int, terms: int, part: int) -> Index:
+    """Places (terms, width) of a part of the results of terms among all results, of which theirs begin somewhere."""
+    return begin + tape.results * np.arange(terms)[:, None] + np.arange(tape.parts[part], tape.parts[part + 1])
 
 
 class Handed:
@@ -258,7 +385,7 @@ class Handed:
     layout : CoreLayout
     model : Model
     noise : ndarray (total,)
-        What rounding leaves of each residual.
+        What rounding leaves of each residual, of all copies.
 
     Attributes
     ----------
@@ -273,11 +400,11 @@ class Handed:
     def __init__(self, layout: CoreLayout, model: Model, noise: Array) -> None:
         self.layout, angles = layout, model.unwrapping
         numbers, sides = np.zeros((angles.count, 8)), np.zeros((angles.count, 3))
-        if angles.count:
+        if angles.count and layout.copies == 1:
             crossed = np.asarray(angles.across.any(axis=1))
             numbers[:, :3], numbers[:, 3:6], numbers[:, 6] = angles.axis, angles.across, np.where(crossed, 1.0, 2.0)
             sides = np.concatenate([angles.sides, crossed[:, None]], axis=1)
-        self._own = [c.doubles(model.beams.weight), noise, numbers, c.integers(sides)]
+        self._own = [c.doubles(layout.repeated(model.beams.weight)), noise, numbers, c.integers(sides)]
         self._take(model)
 
     def _take(self, model: Model) -> None:
@@ -285,7 +412,7 @@ class Handed:
         own = (part.ctypes.data for part in self._own)
         structure.weight, structure.noise, structure.counted, structure.counting = own
         self.groups = type(self.layout.groups).from_buffer_copy(self.layout.groups)
-        self.data = [c.doubles(group.data) for group in model.terms]
+        self.data = [c.doubles(self.layout.repeated(group.data)) for group in model.terms]
         for group, data in zip(self.groups, self.data, strict=True):
             group.datum = data.ctypes.data
         structure.group = ctypes.addressof(self.groups)

@@ -84,8 +84,8 @@ class Layout:
         For each group the multipliers of its rows.
     given : dict of str to slice
         Where the parts of what is given are in the row that :meth:`.Equations.given` makes of a loading.
-    of_core
-        The same as the core takes it, once it was made.
+    of_core : dict
+        The same as the core takes it, by how many copies of it, once it was made.
     programs : dict
         Programs that have been made for models of this structure, by what distinguishes them.
     """
@@ -110,7 +110,7 @@ class Layout:
         self.retained = tables.place_number[(model.positions.retained >= 0).all(axis=1)]
         self.sliding = list(self._sliding(model))
         self.given = self._places_of_given(model)
-        self.of_core: Any = None
+        self.of_core: dict[int, Any] = {}
         self.programs: dict[Any, Any] = {}
         # What is kept keeps no scene alive.
         del tables.model

@@ -1,0 +1,360 @@
+"""Time steps by the core: the stage equations of a system as tables.
+
+The same equations stand as expressions in :mod:`~sfetcas.dynamics.stages`, from which steps are made where there is no
+core, where friction acts or axes rotate, and for generated C.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..mathematics import core as c
+from ..mathematics.arrays import Array, Index
+from ..mathematics.constants import mapped
+from ..mathematics.linear import NO_ROOM, CoreSystem, SparseMap, last_rows
+from ..mathematics.tapes import Tape, tape_of
+from ..mechanics.evaluation import CoreModel, Handed, cells, core_layout
+from ..mechanics.rotations import RotationFreedom
+from ..mechanics.terms import rotation_gradient, rows_of
+from .methods import Method, StageMethod
+from .stages import DUAL_REGULARISATION, StageEquations
+from .steps import ITERATIONS, LAST_CHANGE, LOST
+
+if TYPE_CHECKING:
+    from .taken import Memory
+
+__all__ = ["CoreStep", "core_step"]
+
+
+def core_step(system: StageEquations, method: Method) -> CoreStep | None:
+    """Steps of a method by the core; None where there is none, or something acts that it does not know."""
+    library = c.core()
+    if library is None or not isinstance(method, StageMethod) or method.polished:
+        return None
+    if system.rubbing is not None or system.crossing is not None:
+        return None
+    layout, model = system.equations.layout, system.model
+    copies = core_layout(layout, model, method.stages)
+    if not copies.known:
+        return None
+    elements = len(model.terms[0].data)
+    turning = tape_of(model.element.turned) if elements else None
+    kinds = [group.kind for group in system.masses.observables]
+    rows = [group.kind if len(group.data) and group.labels.size else None for group in model.connections]
+    found = [
+        *(tape_of(rows_of(kind)) for kind in kinds),
+        *(tape_of(rotation_gradient(kind)) for kind in kinds),
+        *(tape_of(rows_of(kind)) for kind in rows if kind is not None),
+    ]
+    tapes = [tape for tape in found if tape is not None]
+    if len(tapes) < len(found) or (elements and turning is None):
+        return None
+    return CoreStep(system, method, turning, tapes)
+
+
+class CoreStep:
+    """Steps of one system by one method.
+
+    Parameters
+    ----------
+    system : StageEquations
+    method : StageMethod
+    turning : Tape or None
+        Turned tangents of an element; None where there are no elements.
+    tapes : list of Tape
+        Of the observables their values, then these with derivatives; of the groups of connections that have rows these.
+    """
+
+    def __init__(self, system: StageEquations, method: StageMethod, turning: Tape | None, tapes: list[Tape]) -> None:
+        library = c.core()
+        assert library is not None
+        self._system, self._method, self._library = system, method, library
+        known = core_layout(system.equations.layout, system.model, method.stages)
+        self._layout = layout = known.beside()
+        total = layout.model.total
+        self._handed = Handed(known, system.model, np.zeros(total))
+        self._model = CoreModel(library, self._handed)
+        # What the tables point to.
+        self._arrays = list[Any]()
+        self._motion = motion = c.Motion(
+            stages=method.stages,
+            kept=method.kept,
+            quantities=system.layout.x,
+            linear=system.linear,
+            groups=len(system.masses.observables),
+            iterations=ITERATIONS,
+            dual=DUAL_REGULARISATION,
+            last_change=LAST_CHANGE,
+            lost=LOST,
+        )
+        self._number()
+        self._relate()
+        self._group(turning, tapes)
+        self._map()
+        self._weigh()
+        self._solver = self._matrix()
+        self._residual, self._results = np.zeros(total), np.zeros(motion.couples + self._coupled)
+        places = (self._residual.ctypes.data, None, None, self._results.ctypes.data, *self._model.shared[1:])
+        self._point = c.Point(0.0, 0.0, *places)
+        self._memory = np.zeros(library.sf_advance_size(self._model.address, ctypes.addressof(motion)))
+        self._hand_over()
+
+    # -- tables ---------------------------------------------------------------------------------------
+
+    def _kept(self, values: Array) -> int:
+        """Address of numbers, whole ones or not, that live as long as this."""
+        found = (c.integers if values.dtype.kind in "iub" else c.doubles)(values)
+        self._arrays.append(found)
+        return int(found.ctypes.data)
+
+    def _number(self) -> None:
+        """Where what belongs to each stage stands among that of all of them, and what is given by a unit of factors."""
+        system, layout, stages = self._system, self._layout, self._method.stages
+        equations, model = system.equations, system.model
+        given = equations.layout.given
+        every = layout.unknowns(np.arange(system.total)).reshape(stages, -1)
+        self._unknown = every
+        at = [
+            stages * part.start
+            + (every if name == "beside" else np.arange(stages * (part.stop - part.start)).reshape(stages, -1))
+            for name, part in given.items()
+        ]
+        self._given_at = np.concatenate(at, axis=1)
+        self._given = np.stack([equations.given(loading) for loading in system.loadings])
+        driven = np.any([group.turn.any(axis=1) for group in model.groups.values()], axis=0)
+        self._driven = np.flatnonzero(driven & (model.rotations.kind == RotationFreedom.FIXED))
+        self._turns = np.stack([loading.turn[self._driven].ravel() for loading in system.loadings])
+        self._motion.driven = stages * len(self._driven)
+        self._motion.drive = self._kept(layout.copied(self._driven, len(model.rotations.kind)))
+        self._row_at = layout.lines(np.arange(system.layout.lam)).reshape(stages, -1)
+        parts = [part for part in model.unwrapping.parts if part is not None]
+        angles = [np.tile(np.arange(part.start, part.stop), stages) for part in parts]
+        self._angle_of = np.concatenate([np.zeros(0, np.intp), *angles])
+
+    def _relate(self) -> None:
+        """The numbers of the method."""
+        motion, given = self._motion, self._method.relations
+        motion.at = self._kept(self._method.places)
+        for name in ("velocity", "acceleration", "after", "velocity_kept", "acceleration_kept", "after_kept"):
+            setattr(motion, name, self._kept(getattr(given, name)))
+        motion.power = self._kept(given.powers)
+
+    def _group(self, turning: Tape | None, tapes: list[Tape]) -> None:
+        """Groups of terms beside those of the model: tangents, observables, rows."""
+        system, layout, motion, stages = self._system, self._layout, self._motion, self._method.stages
+        model, count, end = system.model, len(system.masses.observables), int(layout.begins[-1]) + 1
+        self._remembering = list[tuple[Array, Index, slice]]()
+        for number, group, part in system.memory.parts():
+            own = self._handed.data[number + 1] = self._handed.data[number + 1].copy()
+            self._handed.groups[number + 1].datum = own.ctypes.data
+            self._remembering.append((own.reshape(stages, *group.data.shape), group.kind.memory_columns, part))
+        seen, weighed = (c.Group * count)(), (c.Observables * count)()
+        rows, turned = (c.Group * len(model.terms))(), c.Group()
+        self._arrays += [seen, weighed, rows, turned]
+        if turning is not None:
+            turned = layout.group(model.terms[0], turning, result=end)
+            turned.datum, end = self._handed.data[0].ctypes.data, end + turned.terms * turning.results
+            self._arrays.append(turned)
+        self._stiff = list[tuple[Tape, int]]()
+        # Data of the terms and of observables that change from step to step are written where the core reads them.
+        self._seen_data, first = list[tuple[Array, Index]](), 0
+        values, derivatives, others = tapes[:count], tapes[count : 2 * count], iter(tapes[2 * count :])
+        for i, observed in enumerate(system.masses.observables):
+            data = np.array(layout.repeated(observed.data), dtype=float)
+            if (counted := system.angles_of(observed)) is not None:
+                self._seen_data.append((data.reshape(stages, *observed.data.shape), counted))
+            seen[i] = layout.group(observed, values[i], result=end)
+            end += seen[i].terms * values[i].results
+            row = first + np.arange(stages * observed.mass.size)
+            first += len(row)
+            weighed[i].group = layout.group(observed, derivatives[i], row=row, rows=observed.mass.shape[1], result=end)
+            self._stiff.append((derivatives[i], end))
+            end += weighed[i].group.terms * derivatives[i].results
+            seen[i].datum = weighed[i].group.datum = data.ctypes.data
+            weighed[i].mass, weighed[i].damping = (
+                self._kept(layout.repeated(part)) for part in (observed.mass, observed.damping)
+            )
+            self._arrays.append(data)
+        for number, group in enumerate(model.connections, start=1):
+            if len(group.data) and group.labels.size:
+                own, tape = self._handed.groups[number], next(others)
+                rows[number] = layout.group(group, tape, loads=group.kind.sizes[4], result=end)
+                rows[number].datum, rows[number].load, rows[number].angle = own.datum, own.load, own.angle
+                end += rows[number].terms * tape.results
+        motion.turning, motion.tangent = ctypes.addressof(turned), self._kept(layout.repeated(model.beams.tangent))
+        motion.seen, motion.rows, motion.observables = (ctypes.addressof(part) for part in (seen, rows, weighed))
+        motion.part = self._kept(np.array([0, system.linear, *(stop for _, stop in system.ranges)]))
+        motion.couples = end
+
+    def _map(self) -> None:
+        """Positions of what has mass or drag, their forces on places and elements, and masses and drags."""
+        system, layout, motion = self._system, self._layout, self._motion
+        y = system.model.positions.Y
+        by_place, by_tangent = mapped(system.by_place), mapped(system.by_tangent)
+        onto_places = SparseMap(*_product(y, by_place), (y.shape[1], system.linear))
+        for name, matrix in {
+            "by_place": by_place,
+            "by_tangent": by_tangent,
+            "onto_pull": by_tangent.T,
+            "onto_places": onto_places,
+            "mass": mapped(system.mass),
+            "drag": mapped(system.drag),
+        }.items():
+            setattr(motion, name, layout.map(matrix))
+
+    def _weigh(self) -> None:
+        """Weights of what moves with inner nodes of elements, and of places."""
+        system, motion = self._system, self._motion
+        mass, drag = (part.nonzeros() for part in (system.place_mass, system.place_drag))
+        motion.masses, motion.drags = len(mass), len(drag)
+        motion.place_mass, motion.place_drag = self._kept(np.array(mass)), self._kept(np.array(drag))
+        motion.massive, motion.inside = len(system.massive), self._kept(system.massive)
+        motion.point_of = self._kept(system.points_of_columns)
+        motion.inner_mass, motion.inner_drag = (self._kept(part) for part in system.inner_shares)
+        motion.first_mass, motion.first_drag = (self._kept(part) for part in system.first_shares)
+
+    def _matrix(self) -> CoreSystem:
+        """Of which numbers the entries of the matrix of all stages are sums, and what solves with it."""
+        system, layout, motion, stages = self._system, self._layout, self._motion, self._method.stages
+        static, coupled = system.entry_places.static, system.entry_places.coupled
+        one, both, total = system.tables.tied(static), coupled.places, layout.model.total
+        parts = list[tuple[Index, Index, Array, Index]]()
+        for i in range(stages):
+            at, factor = layout.contributions(i)
+            for (tape, begin), group in zip(self._stiff, system.masses.observables, strict=True):
+                n = len(group.data)
+                at = np.append(at, cells(tape, begin, stages * n, 4)[i * n : (i + 1) * n])
+            at, factor = np.append(at, layout.begins[-1]), np.append(factor, np.ones(len(at) + 1 - len(factor)))
+            row, column, weight, number = one
+            parts.append((self._unknown[i, row], self._unknown[i, column], weight * factor[number], at[number]))
+        row, column, weight, number = both
+        for k in range(stages * stages):
+            i, j = divmod(k, stages)
+            at = motion.couples + k * coupled.count + number
+            parts.append((self._unknown[i, row], self._unknown[j, column], weight, at))
+        rows = np.arange(layout.model.rows)
+        first = motion.couples + stages * stages * coupled.count
+        self._coupled = stages * stages * coupled.count + len(rows)
+        parts.append((layout.model.unknowns + rows, layout.model.unknowns + rows, np.ones(len(rows)), first + rows))
+        row, column, weight, source = (np.concatenate(part) for part in zip(*parts, strict=True))
+        keys, inverse = np.unique(column * total + row, return_inverse=True)
+        motion.entries = layout.sums(len(keys), inverse.ravel(), source, weight)
+        motion.entry_count = len(keys)
+        none = (np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0))
+        onto, source, weight = (np.concatenate(part) for part in zip(none, *self._shares(), strict=True))
+        motion.shares = layout.sums(total, onto, source, weight)
+        last = last_rows(len(rows))
+        return CoreSystem(self._library, total, keys % total, keys // total, np.zeros(total), last, False)
+
+    def _shares(self) -> Iterator[tuple[Index, Index, Array]]:
+        """Forces of the observables onto the unknowns: which, the results that they are, weights."""
+        tables, layout, stages = self._system.tables, self._layout, self._method.stages
+        pairs = zip(self._stiff, self._system.masses.observables, self._system.observed, strict=True)
+        for (tape, begin), group, sides in pairs:
+            unknown = np.where(sides < 0, -1, tables.unknown[sides]).ravel()
+            used = np.flatnonzero(unknown >= 0)
+            source = cells(tape, begin, stages * len(group.data), 3).reshape(stages, -1)
+            weight = tables.weight[sides.ravel()[used]]
+            yield layout.unknowns(unknown[used]), source[:, used].ravel(), layout.repeated(weight)
+
+    # -- steps ----------------------------------------------------------------------------------------
+
+    def _hand_over(self) -> None:
+        """Memory for what a step takes and finds: always the same, so that the core is told only once where it is."""
+        system, n, stages, kept = self._system, self._system.layout, self._method.stages, self._method.kept
+        rotations, unilateral = (n.rotations, n.components), len(system.unilateral)
+        self._taken = taken = {
+            "given": np.zeros(self._given_at.size),
+            "vector": np.zeros((stages, self._turns.shape[1])),
+            "q": np.zeros(rotations),
+            "y": np.zeros(n.y),
+            "lam": np.zeros(self._row_at.size),
+            "turn": np.zeros((stages, n.rotations, system.turns)),
+            "shift": np.zeros((stages, n.y)),
+            "x": np.zeros(n.x),
+            "rate": np.zeros((kept, n.x)),
+            "unwrapped": np.zeros(self._angle_of.size),
+        }
+        if unilateral:
+            # Rows act, and hold at zero, unless they act at times.
+            taken["acting"], taken["held"] = np.ones(self._row_at.size), np.zeros(self._row_at.size)
+            self._switched = self._row_at[:, system.unilateral.rows]
+        sizes = {
+            "last_q": taken["q"].size,
+            "last_y": n.y,
+            "rows": taken["lam"].size,
+            "turns": taken["turn"].size,
+            "shifts": taken["shift"].size,
+            "there": stages * n.x,
+            "rates": taken["rate"].size,
+        }
+        ends = np.cumsum([0, *sizes.values()]).tolist()
+        self._found = np.zeros(ends[-1])
+        self._parts = [slice(*ends[i : i + 2]) for i in range(len(sizes))]
+        addresses = {name: part.ctypes.data for name, part in taken.items()}
+        addresses |= {
+            name: self._found.ctypes.data + part.start * self._found.itemsize
+            for name, part in zip(sizes, self._parts, strict=True)
+        }
+        self._step = c.Advance(**addresses)
+        last = (ctypes.addressof(self._step), ctypes.addressof(self._point), self._memory.ctypes.data)
+        self._handed_over = (self._model.address, ctypes.addressof(self._motion), self._solver.address, *last)
+
+    def __call__(
+        self, memory: Memory, h: float, ratio: float, factors: Array, turns: Array, shifts: Array
+    ) -> tuple[Array, ...]:
+        """As the function of :func:`~sfetcas.dynamics.steps.step_function`, its results as arrays.
+
+        Parameters
+        ----------
+        memory : Memory
+        h, ratio : float
+            Length of the step, and over that of the step before; 0 for a restart.
+        factors : ndarray (stages, groups)
+            Of the loads.
+        turns : ndarray (stages, rotations, turns)
+        shifts : ndarray (stages, displacements)
+            What was gained in the step before.
+        """
+        taken = self._taken
+        for data, columns, own in self._remembering:
+            data[:, :, columns] = memory.remembered[own].reshape(-1, len(columns))
+        for data, counted in self._seen_data:
+            data[:, :, -1] = memory.unwrapped[counted]
+        taken["given"][self._given_at] = factors @ self._given
+        taken["vector"][...] = factors @ self._turns
+        taken["lam"][self._row_at] = memory.lam
+        taken["q"][...], taken["y"][...], taken["x"][...], taken["rate"][...] = (
+            memory.q,
+            memory.y,
+            memory.x,
+            memory.rates,
+        )
+        taken["turn"][...], taken["shift"][...] = turns, shifts
+        taken["unwrapped"][...] = memory.unwrapped[self._angle_of]
+        if len(self._system.unilateral):
+            taken["acting"][self._switched], taken["held"][self._switched] = memory.acting, memory.held
+        step = self._step
+        step.h, step.ratio = h, ratio
+        while (broken := self._library.sf_advance(*self._handed_over)) == NO_ROOM:
+            self._solver.make_room()
+        if broken:
+            # Stopped by a matrix without an inverse, a step leaves no numbers.
+            self._found[...] = np.nan
+        found = self._found.copy()
+        parts = [found[own] for own in self._parts]
+        parts[2] = parts[2][self._row_at]
+        return *parts, np.array([step.size]), np.array([step.iterations]), np.array([step.gap])
+
+
+def _product(y: SparseMap, by_place: SparseMap) -> tuple[Index, Index, Array]:
+    """Entries of ``y^T by_place^T``; each row of y has one entry at most."""
+    of_row, value = np.full(y.shape[0], -1), np.zeros(y.shape[0])
+    of_row[y.row], value[y.row] = y.column, y.value
+    used = np.flatnonzero(of_row[by_place.column] >= 0)
+    place = by_place.column[used]
+    return of_row[place], by_place.row[used], value[place] * by_place.value[used]

@@ -1,0 +1,232 @@
+"""Time steps by the core against the same equations as CasADi functions, and against runs that have no core."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from motions import FLAT, METHODS, THICK, cantilever
+from scenes import made
+from systems import EVERYTHING
+
+import sfetcas
+from sfetcas import Scene, assemble, uniform_mesh
+from sfetcas.dynamics.beginning import at_rest
+from sfetcas.dynamics.integrating import Stepper
+from sfetcas.dynamics.stages import StageEquations
+from sfetcas.dynamics.taken import Memory
+from sfetcas.mathematics import core as c
+from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.masses import masses_of
+
+PROBLEMS = Path(__file__).parent.parent / "problems"
+
+PARTS = ("last_q", "last_y", "rows", "turns", "shifts", "there", "rates", "size", "iterations", "gap")
+
+ROUNDING = 1e-10
+"""Share of the largest of their kind by which results may differ: rounding of a step in unknowns times the condition
+of what it solves, which stiff members under small masses make some 1e5."""
+
+
+@pytest.fixture(autouse=True)
+def library():
+    if c.core() is None:
+        pytest.skip("no core here, and no compiler that makes one")
+
+
+def alike(memory, h, mine, other):
+    """A step by the core is the one of the function."""
+    mine, other = (dict(zip(PARTS, map(np.ravel, step), strict=True)) for step in (mine, other))
+    assert np.isfinite(other["size"]).all() == np.isfinite(mine["size"]).all()
+    if not np.isfinite(other["size"]).all():
+        return
+    assert mine["iterations"] == other["iterations"]
+    assert abs(mine["size"][0] - other["size"][0]) <= 1e-6 * other["size"][0] + 1e-12
+    assert abs(mine["gap"][0] - other["gap"][0]) <= 1e-12 + ROUNDING * other["gap"][0]
+    # Rates are changes over lengths of steps, and forces accelerations times masses: rounding of places is divided.
+    blurred = 1e-13 * max(1.0, float(np.abs(memory.x).max()))
+    divided = {"rates": h ** -len(memory.rates), "rows": h**-2}
+    for name in PARTS[:7]:
+        size = max(1.0, float(np.abs(other[name]).max(initial=0.0)))
+        bound = ROUNDING * size + blurred * divided.get(name, 1.0)
+        assert np.abs(mine[name] - other[name]).max(initial=0.0) <= bound, name
+
+
+def checked(monkeypatch, every):
+    """Compares each so-many-th step that the core takes from now on; the list grows with them."""
+    compared, step = [], Stepper.step
+
+    def taken(self, memory, h):
+        core = self._by_core
+        assert core is not None
+        if self.count % every:
+            return step(self, memory, h)
+
+        def both(*given):
+            mine, other = core(*given), self._by_function(*given)
+            compared.append(mine)
+            alike(memory, h, mine, other)
+            return mine
+
+        monkeypatch.setattr(self, "_by_core", both)
+        try:
+            return step(self, memory, h)
+        finally:
+            monkeypatch.setattr(self, "_by_core", core)
+
+    monkeypatch.setattr(Stepper, "step", taken)
+    return compared
+
+
+def motion_of(table):
+    return made({**table, "analysis": {"type": "dynamic", "end": 1.0}})
+
+
+def model_in_motion(table, order):
+    """The model of a scene whose prescribed motions begin at rest."""
+    driven = {key: {**motion, "history": "on"} for key, motion in table.get("motions", {}).items()}
+    more = {"motions": driven, "histories": {"on": {"t": [0, 1], "polynomial": [[0, 0, 1]]}}} if driven else {}
+    scene = motion_of({**table, **more})
+    return assemble(scene, replace(uniform_mesh(scene, order, 2), places=True), assembly="nodal")
+
+
+def begun(model, method):
+    """A stepper and the state at rest."""
+    system = StageEquations(Equations(model), masses_of(model))
+    stepper, state = Stepper(system, METHODS[method]), at_rest(model)
+    x, _ = system.rates(state, system.factors(0.0), np.zeros(system.equations.unknowns))
+    rates = np.zeros((stepper.method.kept, len(x)))
+    return stepper, Memory(0.0, state.q, state.y, state.lam, x, rates, state.unwrapped, remembered=system.memory.begun)
+
+
+@pytest.mark.parametrize("method", ["radau-3", "radau-2", "generalised-alpha"])
+@pytest.mark.parametrize("name", EVERYTHING)
+def test_steps_are_those_of_the_function(name, method, monkeypatch):
+    """Every kind of term: a step from rest under sudden loads, and a longer one from there."""
+    stepper, memory = begun(model_in_motion(EVERYTHING[name](), 2), method)
+    compared = checked(monkeypatch, 1)
+    first = stepper.step(memory, 0.02)
+    second = stepper.step(first.after, 0.025)
+    assert second.converged
+    assert len(compared) == 2
+    # It moves, by a change that the second step is to expect from the first.
+    assert np.abs(second.turns).max(initial=0.0) + np.abs(second.shifts).max(initial=0.0) > 1e-5
+
+
+STRETCHING = {"EA": 400.0, "GA2": 150.0, "GA3": 180.0}
+BRANCHES = [{"ratio": 0.3, "time": 0.2}, {"ratio": 0.2, "time": 1.0}]
+LOOSE = {"type": "elastic-plastic", "stress": 1.0, "ratio": 0.05, "about": "b3"}
+FIBRES = {"shape": "rectangle", "width": 0.2, "height": 0.4, "E": 1e3, "nu": 0.3, "rho": 1.0, "stretch": True}
+
+
+def wheel(**more):
+    """A rigid bar that a moment drives round against a spring and a damper in its hinge, beyond half a turn."""
+    return {
+        "sections": {"bar": {"rhoA": 2.0, "rhoI": [0.1, 0.1, 0.1]}},
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [0.5, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "type": "rigid", "section": "bar"}},
+        "springs": {"s": {"node": "A", "stiffness": 0.2, "damping": 0.1}},
+        "loads": {"d": {"type": "moment", "node": "A", "value": 3.0}},
+        **more,
+    }
+
+
+def yielding():
+    """A light strip that its end force bends beyond yield at once."""
+    table = cantilever({**FIBRES, "law": LOOSE}, (0.01, 0.05))
+    del table["loads"]["tip"]["history"]
+    return table
+
+
+def on(value=(1.0, 2.0), **section):
+    return cantilever({**FLAT, **section}, value)
+
+
+MOTIONS = {
+    "damped": (on(damping=0.05), 0.4),
+    "dragged": (on(drag=0.5), 0.4),
+    "relaxing": (on(relaxation=BRANCHES), 0.4),
+    "stretching": (on(**STRETCHING, damping=0.05), 0.4),
+    "space": (cantilever({**THICK, **STRETCHING, "relaxation": BRANCHES, "damping": 0.02}, (1.0, 2.0, 0.5)), 0.2),
+    "memory": (yielding(), 0.2),
+    "wheel": (wheel(), 0.8),
+    "wheel in space": (wheel(dimension="space"), 0.8),
+}
+PROBLEMS_WITH = {
+    "bob_on_a_string": "what is slack at times",
+    "ladder_leaves_wall": "places on obstacles",
+    "bars_collide": "members that collide",
+    "slider_crank_motion": "a crank that is driven round",
+    "flying_rod": "what flies freely",
+}
+
+
+@pytest.mark.parametrize("integrator", ["radau-3", "generalised-alpha"])
+@pytest.mark.parametrize("name", MOTIONS)
+def test_motions_are_those_of_the_function(name, integrator, monkeypatch):
+    compared = checked(monkeypatch, 1)
+    table, end = MOTIONS[name]
+    scene = Scene.from_dict(
+        {
+            **table,
+            "analysis": {"type": "dynamic", "end": end, "step": end / 16, "output": end, "integrator": integrator},
+        }
+    )
+    assert sfetcas.solve(scene, element="SFET3", elements=2).status.name == "SOLVED"
+    assert len(compared) >= 16
+
+
+@pytest.mark.parametrize("name", PROBLEMS_WITH)
+def test_problems_are_those_of_the_function(name, monkeypatch):
+    compared = checked(monkeypatch, 9)
+    scene = sfetcas.load(PROBLEMS / f"{name}.toml").replace({"analysis.accuracy": 1e-3})
+    assert sfetcas.solve(scene).status.name == "SOLVED"
+    assert len(compared) >= 3
+
+
+def test_steps_from_what_is_no_state_do_not_converge():
+    stepper, memory = begun(model_in_motion(on(), 2), "radau-3")
+    for bad in (np.nan, np.inf):
+        for name in ("q", "x", "rates"):
+            there = replace(memory, **{name: np.full_like(getattr(memory, name), bad)})
+            assert not stepper.step(there, 0.02).converged
+    # Nothing of it is left.
+    assert stepper.step(memory, 0.02).converged
+
+
+def test_a_matrix_without_an_inverse_leaves_no_numbers():
+    """Steps so short that masses over their square are beyond all numbers."""
+    stepper, memory = begun(model_in_motion(on(), 2), "radau-3")
+    taken = stepper.step(memory, 1e-200)
+    assert not taken.converged
+    assert not np.isfinite(taken.after.x).any()
+
+
+WITHOUT = ["damped", "space", "wheel"]
+
+
+@pytest.mark.parametrize("name", WITHOUT)
+def test_motions_without_the_core(name, monkeypatch):
+    """By the accuracy: the same steps, and the same answers to rounding that steps divide."""
+    table, end = MOTIONS[name]
+    scene = Scene.from_dict({**table, "analysis": {"type": "dynamic", "end": end, "output": end, "accuracy": 1e-4}})
+    mine = sfetcas.solve(scene)
+    monkeypatch.setenv("SFETCAS_CORE", "off")
+    other = sfetcas.solve(scene)
+    assert mine.status is other.status is sfetcas.Status.SOLVED
+    np.testing.assert_allclose(mine.last.position("B"), other.last.position("B"), atol=1e-9)
+    np.testing.assert_allclose(mine.last.velocity("B"), other.last.velocity("B"), atol=1e-7)
+
+
+@pytest.mark.parametrize("name", [*EVERYTHING, "stretching", "wheel in space"])
+def test_quantities_in_numbers_are_those_of_expressions(name):
+    """At a state far from the undeformed one, with prescribed motions on their way."""
+    table = MOTIONS[name][0] if name in MOTIONS else EVERYTHING[name]()
+    model = model_in_motion(table, 3)
+    system = StageEquations(Equations(model), masses_of(model))
+    step, factors = np.random.default_rng(1).normal(size=system.equations.total), system.factors(0.4)
+    state = system.equations.moved(at_rest(model), 0.3 * step)
+    unknowns = step[: system.equations.unknowns]
+    x, _ = system.rates(state, factors, unknowns)
+    assert np.abs(x).max() > 0.1
+    np.testing.assert_allclose(system.rates(state, factors, 0.0 * unknowns)[0], x, atol=1e-14)
