@@ -448,6 +448,39 @@ def test_systems_are_solved(library, symmetric, seed):
         np.testing.assert_allclose(one, x[:, 0], rtol=1e-6, atol=1e-9 * np.abs(x).max())
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_pivots_serve_the_next_matrices(library, seed):
+    """Kept for matrices near the last one; chosen anew where one has become nothing, and by whoever asks alone."""
+    rng, n = np.random.default_rng(seed), 40
+    matrix = rng.normal(size=(n, n)) * (rng.random((n, n)) < 0.15)
+    matrix[np.arange(n), (np.arange(n) + 1) % n] += 3.0
+    row, column = pattern_of(matrix)
+    system = CoreSystem(library, n, row, column, np.zeros(n), 0, False)
+    b, work = rng.normal(size=n), np.zeros(4 * n)
+    rows = (ctypes.c_int * n).from_address(system._pivoted.row_of)
+
+    def solved_again(matrix):
+        entries, x = np.ascontiguousarray(matrix[row, column]), np.zeros(n)
+        given = (entries.ctypes.data, 1, b.ctypes.data, x.ctypes.data, work.ctypes.data)
+        assert library.sf_solve(system.address, *given) == 0
+        assert np.abs(matrix @ x - b).max() <= 1e-13 * n * np.abs(matrix).max() * np.abs(x).max()
+        return list(rows)
+
+    system.solved(matrix[row, column], b)
+    chosen = list(rows)
+    # A pivot that is no more the largest of its column, nor a tenth of that.
+    k = next(k for k in range(n) if chosen[k] != system._order[k] and matrix[chosen[k], system._order[k]] != 0.0)
+    smaller = matrix.copy()
+    smaller[chosen[k], system._order[k]] *= 0.05
+    assert solved_again(smaller) == chosen
+    system.solved(smaller[row, column], b)
+    assert list(rows) != chosen
+    system.solved(matrix[row, column], b)
+    none = matrix.copy()
+    none[chosen[0], system._order[0]] = 0.0
+    assert solved_again(none) != chosen
+
+
 def test_singular_systems_are_refused():
     matrix = np.ones((3, 3))
     row, column = pattern_of(matrix)

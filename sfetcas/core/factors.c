@@ -175,7 +175,8 @@ static double sf_refined(const sf_system *system, int pivoted, const double *ent
 /* Solutions (columns, n) for right sides b; 1 where the matrix is singular, 2 where factors have no room.
  *
  * Symmetric matrices are factorised without pivoting after their diagonal was made soft, which refinement takes back;
- * where that does not converge, and after it often did not, with pivoting.
+ * where that does not converge, and after it often did not, with pivoting, by the pivots of the last matrix where they
+ * serve.
  */
 int sf_solve(sf_system *system, const double *entries, int columns, const double *b, double *x, double *work) {
   int negative, found;
@@ -189,6 +190,10 @@ int sf_solve(sf_system *system, const double *entries, int columns, const double
       return 0;
     }
     ++system->lost;
+  }
+  if (!sf_pivot_again(system->pivoted, entries)) {
+    error = sf_refined(system, 1, entries, columns, b, x, work);
+    if (error <= system->solved) return 0;
   }
   found = sf_pivot(system->pivoted, entries);
   if (found) return found;

@@ -147,6 +147,8 @@ int sf_correct(const sf_model *m, sf_system *system, const double *given, const 
   sf_state *s = room.state;
   sf_point *p = room.point;
   sf_make_room(m, memory, &room);
+  /* What is found here does not depend on what was solved before, not even in its last digits. */
+  system->pivoted->known = 0;
   for (i = 0; i < 2; ++i) {
     p[i].result = point->result;
     p[i].place = point->place;

@@ -6,6 +6,7 @@
  */
 
 #define SF_SMALL 0.1 /* share of the largest in a column that a pivot on the diagonal must have */
+#define SF_SERVES 1e-3 /* the same of a pivot that was chosen for another matrix */
 
 /* Places that the entries of a column reach, in topological order from top on. */
 static int sf_reach(sf_pivoted *f, int column, int mark) {
@@ -41,6 +42,7 @@ static int sf_reach(sf_pivoted *f, int column, int mark) {
 /* Factors of a matrix; 1 where it is singular, 2 where they have no room. */
 static int sf_pivot(sf_pivoted *f, const double *entries) {
   int n = f->n, k, i, p, lower = 0, upper = 0;
+  f->known = 0;
   for (i = 0; i < n; ++i) {
     f->place[i] = -1;
     f->mark[i] = -1;
@@ -86,6 +88,43 @@ static int sf_pivot(sf_pivoted *f, const double *entries) {
     }
     f->lower[k + 1] = lower;
     f->upper[k + 1] = upper;
+  }
+  f->known = 1;
+  return 0;
+}
+
+/* Factors of another matrix with the pivots of the last one, whose patterns are the same; 1 where one has become small.
+ *
+ * Whoever asks looks at what the solution leaves over, and chooses pivots anew where that is much.
+ */
+static int sf_pivot_again(sf_pivoted *f, const double *entries) {
+  int n = f->n, k, p, q;
+  double *x = f->x;
+  if (!f->known) return 1;
+  for (k = 0; k < n; ++k) {
+    int column = f->order[k];
+    double pivot, most;
+    for (p = f->start[column]; p < f->start[column + 1]; ++p) x[f->row[p]] += entries[p];
+    /* Places are in an order in which each is final before its column acts on the others. */
+    for (p = f->upper[k]; p < f->upper[k + 1]; ++p) {
+      int at = f->upper_row[p], from = f->row_of[at];
+      double value = x[from];
+      x[from] = 0.0;
+      f->upper_value[p] = value;
+      for (q = f->lower[at]; q < f->lower[at + 1]; ++q) x[f->lower_row[q]] -= f->lower_value[q] * value;
+    }
+    pivot = x[f->row_of[k]];
+    x[f->row_of[k]] = 0.0;
+    most = fabs(pivot);
+    for (p = f->lower[k]; p < f->lower[k + 1]; ++p) {
+      int i = f->lower_row[p];
+      double value = x[i];
+      x[i] = 0.0;
+      if (!(fabs(value) <= most)) most = fabs(value);
+      f->lower_value[p] = value / pivot;
+    }
+    if (!(fabs(pivot) > SF_SERVES * most)) return 1;
+    f->pivot[k] = pivot;
   }
   return 0;
 }

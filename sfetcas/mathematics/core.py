@@ -163,6 +163,7 @@ class Pivoted(ctypes.Structure):
         ("room", _int),
         *((name, _pointer) for name in ("place", "row_of", "mark", "reached", "stack", "at", "lower", "upper")),
         *((name, _pointer) for name in ("lower_row", "upper_row", "lower_value", "upper_value", "pivot", "x")),
+        ("known", _int),
     )
 
 

@@ -540,6 +540,8 @@ class CoreSystem:
         """
         entries, right = doubles(entries), doubles(b.T)
         x, count = np.empty(right.shape), 1 if b.ndim == 1 else b.shape[1]
+        # Pivots of another matrix would leave other last digits.
+        self._pivoted.known = 0
         while True:
             handed = (entries.ctypes.data, count, right.ctypes.data, x.ctypes.data, self._work.ctypes.data)
             broken = self._library.sf_solve(self.address, *handed)
