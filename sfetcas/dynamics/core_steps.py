@@ -31,9 +31,11 @@ __all__ = ["CoreStep", "core_step"]
 
 
 def core_step(system: StageEquations, method: Method) -> CoreStep | None:
-    """Steps of a method by the core; None where there is none, or something acts that it does not know."""
+    """Steps of a method by the core; None where there is or is to be none, or something acts that it does not know."""
     library = c.core()
-    if library is None or not isinstance(method, StageMethod) or method.polished:
+    if library is None or system.kernels not in ("auto", "core"):
+        return None
+    if not isinstance(method, StageMethod) or method.polished:
         return None
     if system.rubbing is not None or system.crossing is not None:
         return None

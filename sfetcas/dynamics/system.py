@@ -318,7 +318,7 @@ class System(Expressions):
     @functools.cached_property
     def interpreted(self) -> Self:
         """This system with interpreted kernels: compiled functions cannot be differentiated by CasADi."""
-        if self._kernels == "interpreted":
+        if self.kernels == "interpreted":
             return self
         return type(self)(self.equations, self.masses, "interpreted", unilateral=self.unilateral)
 

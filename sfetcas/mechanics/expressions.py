@@ -100,11 +100,11 @@ class SymbolicTerms:
         self.elements, self.points = self.model.rotations.turns.shape
         self.axes, self.turns = self.model.element.axes, self.model.element.turns
         self.places, self.rotations = len(self.model.segments.places), len(self.model.rotations.kind)
-        self._calls, self._kernels = calls, kernels
+        self._calls, self.kernels = calls, kernels
 
     def many(self, function: ca.Function, n: int) -> ca.Function:
         """A function of a single term mapped over n terms, compiled where that pays."""
-        return chosen(function, self._calls * n, self._kernels).map(n)
+        return chosen(function, self._calls * n, self.kernels).map(n)
 
     # -- linear maps --------------------------------------------------------------------------------
 
