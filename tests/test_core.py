@@ -481,6 +481,26 @@ def test_pivots_serve_the_next_matrices(library, seed):
     assert solved_again(none) != chosen
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_factors_serve_matrices_near_theirs(library, seed):
+    """Where asked, and where refinement leaves as little as their own do."""
+    rng, n = np.random.default_rng(seed), 30
+    matrix = rng.normal(size=(n, n)) + n * np.eye(n)
+    row, column = pattern_of(matrix)
+    system = CoreSystem(library, n, row, column, np.zeros(n), 0, False)
+    b, x, work = rng.normal(size=n), np.zeros(n), np.zeros(4 * n)
+    pivots = (ctypes.c_double * n).from_address(system._pivoted.pivot)
+    system.solved(matrix[row, column], b)
+    for change, serve in ((1e-3, True), (0.0, True), (0.9, False)):
+        known, entries = list(pivots), (matrix + change * n * rng.normal(size=(n, n)))[row, column]
+        system._pivoted.known = 2
+        assert library.sf_solve(system.address, entries.ctypes.data, 1, *(a.ctypes.data for a in (b, x, work))) == 0
+        there = np.zeros((n, n))
+        there[row, column] = entries
+        assert np.abs(there @ x - b).max() <= 1e-14 * np.abs(there).max() * np.abs(x).max() * n
+        assert (list(pivots) == known) == serve
+
+
 def test_singular_systems_are_refused():
     matrix = np.ones((3, 3))
     row, column = pattern_of(matrix)

@@ -163,7 +163,7 @@ typedef struct {
   int *lower_row, *upper_row;                        /* (room,) each */
   double *lower_value, *upper_value;                 /* (room,) each */
   double *pivot, *x;                                 /* (n,) each */
-  int known;                                         /* whether there are pivots that may serve the next matrix */
+  int known;                                         /* 1: pivots may serve the next matrix, 2: factors, too */
 } sf_pivoted;
 
 /* Matrices of one pattern, and how they are solved. */

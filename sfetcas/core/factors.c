@@ -135,6 +135,7 @@ static void sf_left(const sf_factors *f, const double *entries, const double *b,
 
 #define SF_ROUNDS 8 /* of refinement at most; usual are three */
 #define SF_NOTHING 1e-16 /* what is left, over matrix times solution, at which refinement ends */
+#define SF_AS_GOOD 1e-2  /* share of what may be left that factors of another matrix leave: as little as its own do */
 
 /* Solutions (columns, n) for right sides b by refinement with the last factors, and the largest of what is left over
  * matrix times solution; not finite where there is none.  work (4 n,). */
@@ -190,6 +191,11 @@ int sf_solve(sf_system *system, const double *entries, int columns, const double
       return 0;
     }
     ++system->lost;
+  }
+  if (system->pivoted->known > 1) {
+    /* What the factors of the last matrix miss of this one refinement makes up for, if it is little. */
+    error = sf_refined(system, 1, entries, columns, b, x, work);
+    if (error <= SF_AS_GOOD * system->solved) return 0;
   }
   if (!sf_pivot_again(system->pivoted, entries)) {
     error = sf_refined(system, 1, entries, columns, b, x, work);

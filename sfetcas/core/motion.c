@@ -423,6 +423,8 @@ int sf_advance(const sf_model *m, const sf_motion *o, sf_system *system, sf_adva
   a->size = NAN;
   sf_guess(m, o, a, &room.state[0]);
   do {
+    /* Within a step matrices differ little. */
+    if (system->pivoted->known) system->pivoted->known = a->iterations ? 2 : 1;
     broken = sf_change(m, o, system, a, scale, &room.state[here], p, &work, &room);
     if (broken) return broken;
     sf_move(m, &room.state[here], room.step, 1.0, &room.state[1 - here]);
