@@ -184,9 +184,12 @@ def step_cost() -> None:
         (scene_name, scene, "SFET5", count, method, kernels)
         for scene_name, scene, count in (("cantilever", cantilever, 8), ("elbow", elbow(), 4))
         for method in METHODS
-        for kernels in ("compiled", "interpreted")
+        for kernels in ("core", "compiled", "interpreted")
     ]
-    cases += [("plane strip", strip, "SFET3", n, "generalised-alpha", "interpreted") for n in (50, 500, 5000)]
+    for n in (50, 500, 5000):
+        cases += [
+            ("plane strip", strip, "SFET3", n, "generalised-alpha", kernels) for kernels in ("core", "interpreted")
+        ]
     for name, scene, element, elements, method, kernels in cases:
         begin = time.perf_counter()
         system = _system(scene, element, elements, kernels)
