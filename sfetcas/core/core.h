@@ -348,6 +348,8 @@ typedef struct {
   int entry_count, iterations;
   int driven;
   const int *drive;                 /* (driven,) numbers of rotations that are prescribed */
+  int sliding, further;             /* groups of places that may slide; numbers of theirs beside what is given */
+  const sf_group *slide;            /* forces and their derivatives by places, multipliers of gaps, and velocities */
   double dual, last_change, lost;
 } sf_motion;
 

@@ -15,7 +15,7 @@
 /* Where the parts of the memory of a step begin. */
 typedef struct {
   sf_state state[2];
-  double *moved, *rates, *accelerations, *forces, *tangents, *given, *turned, *residual, *matrix, *step, *solving;
+  double *moved, *rates, *accelerations, *forces, *tangents, *given, *residual, *matrix, *step, *solving;
   double *in, *slots;
 } sf_stage_room;
 
@@ -40,8 +40,7 @@ static int sf_make_stage_room(const sf_model *m, const sf_motion *o, double *mem
   PART(room->accelerations, x);
   PART(room->forces, x);
   PART(room->tangents, m->elements * m->points * m->axes);
-  PART(room->given, m->given);
-  PART(room->turned, 3 * m->rotations);
+  PART(room->given, m->given + o->further);
   PART(room->residual, m->total);
   PART(room->matrix, o->entry_count);
   PART(room->step, m->total);
@@ -52,6 +51,7 @@ static int sf_make_stage_room(const sf_model *m, const sf_motion *o, double *mem
   }
   for (i = 1; i < m->groups; ++i)
     if (o->rows[i].terms) sf_most(o->rows[i].tape, &arguments, &slots);
+  for (i = 0; i < o->sliding; ++i) sf_most(o->slide[i].tape, &arguments, &slots);
   if (m->elements) sf_most(o->turning->tape, &arguments, &slots);
   PART(room->in, 8 * arguments);
   PART(room->slots, 8 * slots);
@@ -140,6 +140,20 @@ static void sf_inertia(const sf_motion *o, sf_stage_room *room) {
   }
 }
 
+/* Velocities of the places that may slide, relative to what carries the obstacles, as loads of their terms. */
+static void sf_slide(const sf_model *m, const sf_motion *o, const double *rates, double *given) {
+  int g, t, k, axes = m->axes, places = m->places / o->stages;
+  for (g = 0; g < o->sliding; ++g) {
+    const sf_group *group = o->slide + g;
+    for (t = 0; t < group->terms; ++t) {
+      const int *place = group->place + (size_t)t * 2;
+      const double *own = rates + (size_t)(place[0] / places) * o->linear + (place[0] % places) * axes;
+      const double *carrier = rates + (size_t)(place[0] / places) * o->linear + (place[1] % places) * axes;
+      for (k = 0; k < axes; ++k) given[group->load + t * axes + k] = own[k] - (place[1] < 0 ? 0.0 : carrier[k]);
+    }
+  }
+}
+
 /* What quantities moved by since the begin of the step. */
 static void sf_moved_by(const sf_motion *o, const double *x, double *moved) {
   int k, i, n;
@@ -213,6 +227,15 @@ static double *sf_hung(const sf_model *m, const sf_motion *o, const sf_point *p,
   return to;
 }
 
+/* Those of the forces of places of one stage that slide: the last results of their terms. */
+static double *sf_by_velocity(const sf_model *m, const sf_group *group, int i, int stages, double c, const sf_point *p,
+                              double *to) {
+  int t, k, n = m->axes * m->axes, count = group->terms / stages, results = group->tape->results;
+  for (t = i * count; t < (i + 1) * count; ++t)
+    for (k = 0; k < n; ++k) *to++ = c * p->result[group->result + (size_t)(t + 1) * results - n + k];
+  return to;
+}
+
 /* Everything of which the matrix has sums, behind the results of the terms. */
 static void sf_couple(const sf_model *m, const sf_motion *o, const sf_advance_of *a, const sf_point *p, double *to) {
   int i, j, k, s = o->stages;
@@ -224,6 +247,7 @@ static void sf_couple(const sf_model *m, const sf_motion *o, const sf_advance_of
       to = sf_hung(m, o, p, i, j, c, b, to);
       for (k = 0; k < o->masses; ++k) *to++ = b * o->place_mass[k];
       for (k = 0; k < o->drags; ++k) *to++ = c * o->place_drag[k];
+      for (k = 0; k < o->sliding; ++k) to = sf_by_velocity(m, o->slide + k, i, s, c, p, to);
     }
   /* Constraints that depend on each other do not make it singular; rows that do not act have a multiplier of zero. */
   for (i = 0; i < m->rows; ++i)
@@ -240,6 +264,7 @@ static int sf_change(const sf_model *m, const sf_motion *o, sf_system *system, c
   sf_rates(o, a, scale, room);
   sf_inertia(o, room);
   sf_copy(room->given, a->given, m->given);
+  sf_slide(m, o, room->rates, room->given);
   sf_times(&o->onto_pull, room->forces, room->given + m->pull, 1);
   sf_times(&o->onto_places, room->forces, room->given + m->beside + m->rotation_unknowns, 1);
   if (a->acting) {
@@ -249,6 +274,7 @@ static int sf_change(const sf_model *m, const sf_motion *o, sf_system *system, c
   }
   sf_evaluate(m, &seen, room->given, p);
   sf_residual(m, &seen, room->given, p, work);
+  for (g = 0; g < o->sliding; ++g) sf_terms(m, o->slide + g, 0, &seen, room->given, p, work);
   seen.lam = room->forces + (size_t)o->stages * o->linear;
   for (g = 0; g < o->groups; ++g) sf_terms(m, &o->observables[g].group, 0, &seen, a->given, p, work);
   sf_sum(&o->shares, p->result, room->residual);

@@ -1,7 +1,7 @@
 """Time steps by the core: the stage equations of a system as tables.
 
 The same equations stand as expressions in :mod:`~sfetcas.dynamics.stages`, from which steps are made where there is no
-core, where friction acts or axes rotate, and for generated C.
+core, where axes rotate, and for generated C.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from ..mathematics.linear import NO_ROOM, CoreSystem, SparseMap, last_rows
 from ..mathematics.tapes import Tape, tape_of
 from ..mechanics.evaluation import CoreModel, Handed, cells, core_layout
 from ..mechanics.rotations import RotationFreedom
+from ..mechanics.rubbing import Sliding, sliding_term
 from ..mechanics.terms import rotation_gradient, rows_of
 from .methods import Method, StageMethod
 from .stages import DUAL_REGULARISATION, StageEquations
@@ -37,7 +38,7 @@ def core_step(system: StageEquations, method: Method) -> CoreStep | None:
         return None
     if not isinstance(method, StageMethod) or method.polished:
         return None
-    if system.rubbing is not None or system.crossing is not None:
+    if system.crossing is not None:
         return None
     layout, model = system.equations.layout, system.model
     copies = core_layout(layout, model, method.stages)
@@ -47,10 +48,12 @@ def core_step(system: StageEquations, method: Method) -> CoreStep | None:
     turning = tape_of(model.element.turned) if elements else None
     kinds = [group.kind for group in system.masses.observables]
     rows = [group.kind if len(group.data) and group.labels.size else None for group in model.connections]
+    sliding = [] if system.rubbing is None else system.rubbing.sliding()
     found = [
         *(tape_of(rows_of(kind)) for kind in kinds),
         *(tape_of(rotation_gradient(kind)) for kind in kinds),
         *(tape_of(rows_of(kind)) for kind in rows if kind is not None),
+        *(tape_of(sliding_term(group.kind)) for group in sliding),
     ]
     tapes = [tape for tape in found if tape is not None]
     if len(tapes) < len(found) or (elements and turning is None):
@@ -68,7 +71,8 @@ class CoreStep:
     turning : Tape or None
         Turned tangents of an element; None where there are no elements.
     tapes : list of Tape
-        Of the observables their values, then these with derivatives; of the groups of connections that have rows these.
+        Of the observables their values, then these with derivatives; of the groups of connections that have rows these;
+        of places that slide their forces.
     """
 
     def __init__(self, system: StageEquations, method: StageMethod, turning: Tape | None, tapes: list[Tape]) -> None:
@@ -154,6 +158,11 @@ class CoreStep:
             own = self._handed.data[number + 1] = self._handed.data[number + 1].copy()
             self._handed.groups[number + 1].datum = own.ctypes.data
             self._remembering.append((own.reshape(stages, *group.data.shape), group.kind.memory_columns, part))
+        self._told = list[tuple[Array, Index]]()
+        for number, members in () if system.rubbing is None else system.rubbing.groups.items():
+            own = self._handed.data[number] = self._handed.data[number].copy()
+            self._handed.groups[number].datum = own.ctypes.data
+            self._told.append((own.reshape(stages, len(members), -1), members))
         seen, weighed = (c.Group * count)(), (c.Observables * count)()
         rows, turned = (c.Group * len(model.terms))(), c.Group()
         self._arrays += [seen, weighed, rows, turned]
@@ -187,10 +196,33 @@ class CoreStep:
                 rows[number] = layout.group(group, tape, loads=group.kind.sizes[4], result=end)
                 rows[number].datum, rows[number].load, rows[number].angle = own.datum, own.load, own.angle
                 end += rows[number].terms * tape.results
+        end = self._slide(list(others), end)
         motion.turning, motion.tangent = ctypes.addressof(turned), self._kept(layout.repeated(model.beams.tangent))
         motion.seen, motion.rows, motion.observables = (ctypes.addressof(part) for part in (seen, rows, weighed))
         motion.part = self._kept(np.array([0, system.linear, *(stop for _, stop in system.ranges)]))
         motion.couples = end
+
+    def _slide(self, tapes: list[Tape], end: int) -> int:
+        """Groups of the places that may slide, whose results begin at ``end``; where those of others begin."""
+        rubbing, layout, motion = self._system.rubbing, self._layout, self._motion
+        self._sliding = list[tuple[Sliding, Tape, int]]()
+        self._slid = list[tuple[Array, Index]]()
+        if rubbing is None:
+            return end
+        found, given = (c.Group * len(tapes))(), layout.model.given
+        for i, (group, tape) in enumerate(zip(rubbing.sliding(), tapes, strict=True)):
+            own, row = np.array(layout.repeated(group.data)), layout.lines(group.gaps)
+            found[i] = layout.group(group, tape, row=row, rows=1, loads=rubbing.axes, result=end)
+            found[i].datum, found[i].load = own.ctypes.data, given
+            given += found[i].terms * rubbing.axes
+            self._sliding.append((group, tape, end))
+            self._slid.append((own.reshape(self._method.stages, *group.data.shape), group.members))
+            self._arrays.append(own)
+            end += found[i].terms * tape.results
+        self._arrays.append(found)
+        motion.sliding, motion.further = len(tapes), given - layout.model.given
+        motion.slide = ctypes.addressof(found)
+        return end
 
     def _map(self) -> None:
         """Positions of what has mass or drag, their forces on places and elements, and masses and drags."""
@@ -230,10 +262,12 @@ class CoreStep:
             for (tape, begin), group in zip(self._stiff, system.masses.observables, strict=True):
                 n = len(group.data)
                 at = np.append(at, cells(tape, begin, stages * n, 4)[i * n : (i + 1) * n])
+            at = np.concatenate([at, *self._by_place_and_gap(i)])
             at, factor = np.append(at, layout.begins[-1]), np.append(factor, np.ones(len(at) + 1 - len(factor)))
             row, column, weight, number = one
             parts.append((self._unknown[i, row], self._unknown[i, column], weight * factor[number], at[number]))
         row, column, weight, number = both
+        number = self._of_sliding(coupled.count)[number]
         for k in range(stages * stages):
             i, j = divmod(k, stages)
             at = motion.couples + k * coupled.count + number
@@ -252,6 +286,26 @@ class CoreStep:
         last = last_rows(len(rows))
         return CoreSystem(self._library, total, keys % total, keys // total, np.zeros(total), last, False)
 
+    def _by_place_and_gap(self, stage: int) -> Iterator[Index]:
+        """Where derivatives of the forces of places that slide are, by their displacements, then by multipliers."""
+        for part in (1, 2) if self._sliding else ():
+            found = [
+                (group.members, cells(tape, begin, self._method.stages * len(group.members), part))
+                for group, tape, begin in self._sliding
+            ]
+            members = np.concatenate([one for one, _ in found])
+            own = [at[stage * len(one) : (stage + 1) * len(one)] for one, at in found]
+            yield np.concatenate(own)[np.argsort(members)].ravel()
+
+    def _of_sliding(self, count: int) -> Index:
+        """Of numbers that couple stages, whose last are those of places that slide, where they are for the core."""
+        found = np.arange(count)
+        if self._sliding:
+            members = np.concatenate([group.members for group, _, _ in self._sliding])
+            last = found[count - len(members) * self._system.axes**2 :].reshape(len(members), -1)
+            last[members] = last.copy()
+        return found
+
     def _shares(self) -> Iterator[tuple[Index, Index, Array]]:
         """Forces of the observables onto the unknowns: which, the results that they are, weights."""
         tables, layout, stages = self._system.tables, self._layout, self._method.stages
@@ -262,6 +316,12 @@ class CoreStep:
             source = cells(tape, begin, stages * len(group.data), 3).reshape(stages, -1)
             weight = tables.weight[sides.ravel()[used]]
             yield layout.unknowns(unknown[used]), source[:, used].ravel(), layout.repeated(weight)
+        for sliding, tape, begin in self._sliding:
+            own = tables.place_cells(sliding.places[:, 0]).ravel()
+            used = np.flatnonzero(tables.unknown[own] >= 0)
+            source = cells(tape, begin, stages * len(sliding.members), 0).reshape(stages, -1)
+            onto = layout.unknowns(tables.unknown[own[used]])
+            yield onto, source[:, used].ravel(), layout.repeated(tables.weight[own[used]])
 
     # -- steps ----------------------------------------------------------------------------------------
 
@@ -284,7 +344,8 @@ class CoreStep:
         if unilateral:
             # Rows act, and hold at zero, unless they act at times.
             taken["acting"], taken["held"] = np.ones(self._row_at.size), np.zeros(self._row_at.size)
-            self._switched = self._row_at[:, system.unilateral.rows]
+            self._switched = self._row_at[:, system.switching]
+            self._holding = self._row_at[:, system.unilateral.rows]
         sizes = {
             "last_q": taken["q"].size,
             "last_y": n.y,
@@ -323,8 +384,8 @@ class CoreStep:
             What was gained in the step before.
         """
         taken = self._taken
-        for data, columns, own in self._remembering:
-            data[:, :, columns] = memory.remembered[own].reshape(-1, len(columns))
+        for data, columns, part in self._remembering:
+            data[:, :, columns] = memory.remembered[part].reshape(-1, len(columns))
         for data, counted in self._seen_data:
             data[:, :, -1] = memory.unwrapped[counted]
         taken["given"][self._given_at] = factors @ self._given
@@ -339,7 +400,15 @@ class CoreStep:
         taken["turn"][...], taken["shift"][...] = turns, shifts
         taken["unwrapped"][...] = memory.unwrapped[self._angle_of]
         if len(self._system.unilateral):
-            taken["acting"][self._switched], taken["held"][self._switched] = memory.acting, memory.held
+            switches, rubs, rubbing = memory.acting, memory.rubs, self._system.rubbing
+            if rubbing is not None and rubs is not None:
+                switches = np.concatenate([switches, rubs.holds.ravel()])
+                sliding = rubbing.sliding_of(rubs)
+                for data, members in self._told:
+                    data[:, :, : rubbing.told] = rubs.told[members]
+                for data, members in self._slid:
+                    data[:, :, -sliding.shape[1] :] = sliding[members]
+            taken["acting"][self._switched], taken["held"][self._holding] = switches, memory.held
         step = self._step
         step.h, step.ratio = h, ratio
         while (broken := self._library.sf_advance(*self._handed_over)) == NO_ROOM:

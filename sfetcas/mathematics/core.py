@@ -297,6 +297,8 @@ class Motion(ctypes.Structure):
         *((name, _pointer) for name in ("place_mass", "place_drag")),
         *((name, _int) for name in ("entry_count", "iterations", "driven")),
         ("drive", _pointer),
+        *((name, _int) for name in ("sliding", "further")),
+        ("slide", _pointer),
         *((name, _double) for name in ("dual", "last_change", "lost")),
     )
 

@@ -31,7 +31,7 @@ from .model import Model
 from .terms import GROUND, name_of
 from .unilateral import UnilateralRows
 
-__all__ = ["STILL", "Rubbing", "Rubs", "rubbing_of"]
+__all__ = ["STILL", "Rubbing", "Rubs", "Sliding", "rubbing_of", "sliding_term"]
 
 STILL = 1e-6
 """Speed along an obstacle, dimensionless, up to which a place may begin to stick."""
@@ -66,8 +66,12 @@ class Rubs:
     @property
     def flat(self) -> Array:
         """All of it as one vector, as :meth:`Rubbing.parts` takes it apart."""
-        told = np.concatenate([self.frames, self.held[:, :, None]], axis=2)
-        return np.concatenate([self.slides, self.holds.ravel(), self.ways.ravel(), told.ravel()])
+        return np.concatenate([self.slides, self.holds.ravel(), self.ways.ravel(), self.told.ravel()])
+
+    @property
+    def told(self) -> Array:
+        """Where and along what places are held, (m, told)."""
+        return np.concatenate([self.frames, self.held[:, :, None]], axis=2).reshape(len(self.sticks), -1)
 
     def drifted(self, u: Array) -> float:
         """How far displacements (m, axes) are at most from those that places keep that stick."""
@@ -82,6 +86,33 @@ class _Kind:
     kind: Facing
     members: Index
     data: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Sliding:
+    """Places that rub on obstacles of one kind, as terms of :func:`sliding_term`.
+
+    Attributes
+    ----------
+    kind : Term
+        The constraint of the gap.
+    members : ndarray (n,)
+        Their numbers among all that rub.
+    turns : ndarray (n, 0)
+    places : ndarray (n, 2)
+        The place, and the one that carries the obstacle, -1 for none.
+    data : ndarray (n, data)
+        Those of the gap; then the coefficient where it slides, else zero, and the way.
+    gaps : ndarray (n,)
+        Numbers of the rows of the gaps.
+    """
+
+    kind: Facing
+    members: Index
+    turns: Index
+    places: Index
+    data: Array
+    gaps: Index
 
 
 class Rubbing:
@@ -232,6 +263,27 @@ class Rubbing:
         pushes = -lam[self.gaps] * rubs.slides
         return float(self.coefficients * pushes @ (d * velocities).sum(axis=1))
 
+    # -- as terms ---------------------------------------------------------------------------------------
+
+    def sliding(self) -> list[Sliding]:
+        """The places as groups of terms."""
+        nothing = np.zeros((len(self), self.axes + 1))
+        return [
+            Sliding(
+                one.kind,
+                one.members,
+                np.zeros((len(one.members), 0), np.intp),
+                np.stack([self.places[one.members], self.carriers[one.members]], axis=1),
+                np.concatenate([one.data, nothing[one.members]], axis=1),
+                self.gaps[one.members],
+            )
+            for one in self._kinds
+        ]
+
+    def sliding_of(self, rubs: Rubs) -> Array:
+        """The last of their data, (m, 1 + axes)."""
+        return np.concatenate([(self.coefficients * rubs.slides)[:, None], rubs.ways], axis=1)
+
     # -- expressions ------------------------------------------------------------------------------------
 
     def forces(self, places: ca.MX, lam: ca.MX, flat: ca.MX, rates: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
@@ -329,6 +381,19 @@ def _sliding(kind: Facing) -> ca.Function:
     found = [residual, *(ca.jacobian(residual, part) for part in (u, lam, v))]
     arguments = [u, data, lam, weight, way, v]
     return ca.Function(f"sliding_{name_of(kind)}", arguments, [ca.densify(x) for x in found], {"cse": True})
+
+
+@functools.cache
+def sliding_term(kind: Facing) -> ca.Function:
+    """``(u, data, v, lam) ->`` as of :func:`_sliding`, for the arguments of a term: :class:`Sliding` tells its data.
+
+    ``u`` (axes, 2) are displacements of the place and of what carries the obstacle, ``v`` the velocity relative to it.
+    """
+    own, axes = kind.sizes[3], kind.axes
+    u, data, lam = ca.SX.sym("u", axes, 2), ca.SX.sym("data", own + 1 + axes), ca.SX.sym("lam")
+    v = ca.SX.sym("v", axes)
+    found = _sliding(kind)(u[:, 0] - u[:, 1], data[:own], lam, data[own], data[own + 1 :], v)
+    return ca.Function(f"sliding_term_{name_of(kind)}", [u, data, v, lam], list(found))
 
 
 NOTHING = 1e-60
