@@ -1,5 +1,7 @@
 """Time steps by the core against the same equations as CasADi functions, and against runs that have no core."""
 
+import gc
+import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -291,3 +293,17 @@ def test_quantities_in_numbers_are_those_of_expressions(name):
     x, _ = system.rates(state, factors, unknowns)
     assert np.abs(x).max() > 0.1
     np.testing.assert_allclose(system.rates(state, factors, 0.0 * unknowns)[0], x, atol=1e-14)
+
+
+@pytest.mark.parametrize("method", ["radau-3", "generalised-alpha"])
+def test_steps_keep_nothing_of_those_long_before(method):
+    stepper, memory = begun(model_in_motion(on(), 2), method)
+    taken = stepper.step(memory, 0.02)
+    first = weakref.ref(taken)
+    memory = stepper.step(taken.after, 0.02).after
+    del taken
+    assert memory.last is not None
+    gc.collect()
+    assert first() is None
+    memory = stepper.step(memory, 0.02).after
+    assert memory.last.h == 0.02
