@@ -172,10 +172,8 @@ static void sf_switch(const sf_advance_of *a, int rows, double *value, int held)
 }
 
 /* Matrix entries that observables have by the quantities of another stage: J_i^T (b m + c d) J_j. */
-static double *sf_pairs(const sf_model *m, const sf_motion *o, const sf_point *p, int i, int j, double c, double b,
-                        double *to) {
+static double *sf_pairs(const sf_motion *o, const sf_point *p, int i, int j, double c, double b, double *to) {
   int g, t, row, x, y;
-  (void)m;
   for (g = 0; g < o->groups; ++g) {
     const sf_observables *seen = o->observables + g;
     const sf_group *group = &seen->group;
@@ -243,7 +241,7 @@ static void sf_couple(const sf_model *m, const sf_motion *o, const sf_advance_of
   for (i = 0; i < s; ++i)
     for (j = 0; j < s; ++j) {
       double c = o->velocity[i * s + j] / a->h, b = o->acceleration[i * s + j] / (a->h * a->h);
-      to = sf_pairs(m, o, p, i, j, c, b, to);
+      to = sf_pairs(o, p, i, j, c, b, to);
       to = sf_hung(m, o, p, i, j, c, b, to);
       for (k = 0; k < o->masses; ++k) *to++ = b * o->place_mass[k];
       for (k = 0; k < o->drags; ++k) *to++ = c * o->place_drag[k];

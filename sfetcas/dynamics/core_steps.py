@@ -83,6 +83,8 @@ class CoreStep:
         self._layout = layout = known.beside()
         total = layout.model.total
         self._handed = Handed(known, system.model, np.zeros(total))
+        # Within a step angles are counted from what they are at its begin.
+        self._handed.structure.angles = 0
         self._model = CoreModel(library, self._handed)
         # What the tables point to.
         self._arrays = list[Any]()
