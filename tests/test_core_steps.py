@@ -211,6 +211,14 @@ MOTIONS = {
     "cylinder": (bowl("cylinder"), 0.4),
     "sphere": (bowl("sphere"), 0.4),
     "between": (between(), 0.2),
+    "rotating": (on(damping=0.05) | {"rotating": [0, 0, 1.5]}, 0.4),
+    "rotating in space": (
+        cantilever({**THICK, **STRETCHING}, (1.0, 2.0, 0.5), rotating=[0.3, 0.5, 1.5], dimension="space"),
+        0.2,
+    ),
+    "rotating bar": (wheel(dimension="space", rotating=[0.2, 1.0, 0.5]), 0.4),
+    "rotating parts": (EVERYTHING["small_space"]() | {"rotating": [0.4, 0.6, 0.5]}, 0.1),
+    "rough in rotating axes": (between() | {"rotating": [0.2, 0.3, 0.4], "gravity": [0, -30.0]}, 0.2),
 }
 PROBLEMS_WITH = {
     "bob_on_a_string": "what is slack at times",

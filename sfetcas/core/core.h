@@ -319,6 +319,7 @@ SF_PUBLIC int sf_solve_cases(const sf_model *model, sf_system *system, sf_cases 
 typedef struct {
   sf_group group;
   const double *mass, *damping; /* (terms, rows) */
+  int vectors;                  /* how many of the rows, from the first on, are those of vectors */
 } sf_observables;
 
 /* Motions of a model of all stages of a step: copies of everything, stage after stage within each part.
@@ -350,6 +351,10 @@ typedef struct {
   const int *drive;                 /* (driven,) numbers of rotations that are prescribed */
   int sliding, further;             /* groups of places that may slide; numbers of theirs beside what is given */
   const sf_group *slide;            /* forces and their derivatives by places, multipliers of gaps, and velocities */
+  const double *cross;              /* (axes, axes) twice the spin of rotating axes as a product; NULL in fixed ones */
+  sf_map coriolis;                  /* forces of the rates of all quantities in rotating axes */
+  int weights;                      /* pairs of places that share a mass, in rotating axes */
+  const double *weight;
   double dual, last_change, lost;
 } sf_motion;
 

@@ -138,6 +138,7 @@ static void sf_inertia(const sf_motion *o, sf_stage_room *room) {
     for (i = 0; i < count; ++i, ++n)
       force[n] = seen->mass[i] * room->accelerations[n] + seen->damping[i] * room->rates[n];
   }
+  sf_times(&o->coriolis, room->rates, force, 1);
 }
 
 /* Velocities of the places that may slide, relative to what carries the obstacles, as loads of their terms. */
@@ -195,15 +196,21 @@ static double *sf_pairs(const sf_motion *o, const sf_point *p, int i, int j, dou
   return to;
 }
 
+/* Derivatives of the turned tangents of an element whose inner nodes have mass, at a stage. */
+static const double *sf_of_element(const sf_model *m, const sf_motion *o, const sf_point *p, int stage, int e) {
+  const sf_group *element = m->group;
+  size_t number = (size_t)stage * (m->elements / o->stages) + o->inside[e];
+  return p->result + element->result + number * element->tape->results + element->jacobian;
+}
+
 /* Those of inner nodes of elements, which hang on the first place of their element. */
 static double *sf_hung(const sf_model *m, const sf_motion *o, const sf_point *p, int i, int j, double c, double b,
                        double *to) {
   const sf_group *element = m->group;
-  int results = element->tape->results, axes = m->axes, n = m->points, e, x, y, k, own = m->elements / o->stages;
-  int width = o->massive ? (results - element->jacobian) / axes : 0, side;
+  int axes = m->axes, n = m->points, e, x, y, k, side;
+  int width = o->massive ? (element->tape->results - element->jacobian) / axes : 0;
   for (e = 0; e < o->massive; ++e) {
-    const double *one = p->result + element->result + ((size_t)i * own + o->inside[e]) * results + element->jacobian;
-    const double *other = p->result + element->result + ((size_t)j * own + o->inside[e]) * results + element->jacobian;
+    const double *one = sf_of_element(m, o, p, i, e), *other = sf_of_element(m, o, p, j, e);
     const double *mass = o->inner_mass + (size_t)e * n * n, *drag = o->inner_drag + (size_t)e * n * n;
     for (y = 0; y < width; ++y)
       for (x = 0; x < width; ++x) {
@@ -215,8 +222,7 @@ static double *sf_hung(const sf_model *m, const sf_motion *o, const sf_point *p,
   }
   for (side = 0; side < 2; ++side)
     for (e = 0; e < o->massive; ++e) {
-      const double *its = p->result + element->result +
-                          ((size_t)(side ? j : i) * own + o->inside[e]) * results + element->jacobian;
+      const double *its = sf_of_element(m, o, p, side ? j : i, e);
       const double *mass = o->first_mass + (size_t)e * n, *drag = o->first_drag + (size_t)e * n;
       for (x = 0; x < width; ++x)
         for (k = 0; k < axes; ++k)
@@ -234,6 +240,64 @@ static double *sf_by_velocity(const sf_model *m, const sf_group *group, int i, i
   return to;
 }
 
+/* One row of what a matrix, repeated along leading vectors, makes of a column of derivatives; zero behind these. */
+static double sf_crossed(const sf_model *m, const double *cross, int vectors, const double *column, int row) {
+  int k, axes = m->axes;
+  double sum = 0.0;
+  if (row >= vectors * axes) return 0.0;
+  for (k = 0; k < axes; ++k) sum += cross[row % axes * axes + k] * column[row / axes * axes + k];
+  return sum;
+}
+
+/* What Coriolis forces add to the entries that couple stages. */
+static double *sf_turning(const sf_model *m, const sf_motion *o, const sf_point *p, int i, int j, double c,
+                          double *to) {
+  const sf_group *element = m->group;
+  int g, t, e, x, y, k, side, row, axes = m->axes, n = m->points;
+  int wide = o->massive ? (element->tape->results - element->jacobian) / axes : 0;
+  for (g = 0; g < o->groups; ++g) {
+    const sf_observables *seen = o->observables + g;
+    const sf_group *group = &seen->group;
+    int results = group->tape->results, rows = group->rows, count = group->terms / o->stages;
+    int width = (results - group->jacobian) / rows;
+    for (t = 0; t < count; ++t) {
+      const double *one = p->result + group->result + ((size_t)i * count + t) * results + group->jacobian;
+      const double *other = p->result + group->result + ((size_t)j * count + t) * results + group->jacobian;
+      for (y = 0; y < width; ++y)
+        for (x = 0; x < width; ++x) {
+          double sum = 0.0;
+          for (row = 0; row < rows; ++row)
+            sum += one[x * rows + row] * c * seen->mass[(size_t)t * rows + row] *
+                   sf_crossed(m, o->cross, seen->vectors, other + y * rows, row);
+          *to++ = sum;
+        }
+    }
+  }
+  for (e = 0; e < o->massive; ++e) {
+    const double *one = sf_of_element(m, o, p, i, e), *other = sf_of_element(m, o, p, j, e);
+    for (y = 0; y < wide; ++y)
+      for (x = 0; x < wide; ++x) {
+        double sum = 0.0;
+        for (k = 0; k < axes; ++k) sum += one[x * axes + k] * sf_crossed(m, o->cross, 1, other + y * axes, k);
+        *to++ = sum * c * o->inner_mass[((size_t)e * n + o->point_of[x]) * n + o->point_of[y]];
+      }
+  }
+  for (side = 0; side < 2; ++side)
+    for (e = 0; e < o->massive; ++e) {
+      const double *its = sf_of_element(m, o, p, side ? j : i, e);
+      for (x = 0; x < wide; ++x)
+        for (k = 0; k < axes; ++k) {
+          double sum = 0.0;
+          for (row = 0; row < axes; ++row)
+            sum += o->cross[side ? k * axes + row : row * axes + k] * its[x * axes + row];
+          *to++ = sum * c * o->first_mass[(size_t)e * n + o->point_of[x]];
+        }
+    }
+  for (t = 0; t < o->weights; ++t)
+    for (k = 0; k < axes * axes; ++k) *to++ = c * o->weight[t] * o->cross[k];
+  return to;
+}
+
 /* Everything of which the matrix has sums, behind the results of the terms. */
 static void sf_couple(const sf_model *m, const sf_motion *o, const sf_advance_of *a, const sf_point *p, double *to) {
   int i, j, k, s = o->stages;
@@ -246,6 +310,7 @@ static void sf_couple(const sf_model *m, const sf_motion *o, const sf_advance_of
       for (k = 0; k < o->masses; ++k) *to++ = b * o->place_mass[k];
       for (k = 0; k < o->drags; ++k) *to++ = c * o->place_drag[k];
       for (k = 0; k < o->sliding; ++k) to = sf_by_velocity(m, o->slide + k, i, s, c, p, to);
+      if (o->cross) to = sf_turning(m, o, p, i, j, c, to);
     }
   /* Constraints that depend on each other do not make it singular; rows that do not act have a multiplier of zero. */
   for (i = 0; i < m->rows; ++i)

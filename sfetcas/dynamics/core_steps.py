@@ -1,7 +1,7 @@
 """Time steps by the core: the stage equations of a system as tables.
 
 The same equations stand as expressions in :mod:`~sfetcas.dynamics.stages`, from which steps are made where there is no
-core, where axes rotate, and for generated C.
+core, and for generated C.
 """
 
 from __future__ import annotations
@@ -37,8 +37,6 @@ def core_step(system: StageEquations, method: Method) -> CoreStep | None:
     if library is None or system.kernels not in ("auto", "core"):
         return None
     if not isinstance(method, StageMethod) or method.polished:
-        return None
-    if system.crossing is not None:
         return None
     layout, model = system.equations.layout, system.model
     copies = core_layout(layout, model, method.stages)
@@ -191,6 +189,7 @@ class CoreStep:
             weighed[i].mass, weighed[i].damping = (
                 self._kept(layout.repeated(part)) for part in (observed.mass, observed.damping)
             )
+            weighed[i].vectors = observed.kind.vectors
             self._arrays.append(data)
         for number, group in enumerate(model.connections, start=1):
             if len(group.data) and group.labels.size:
@@ -252,6 +251,24 @@ class CoreStep:
         motion.point_of = self._kept(system.points_of_columns)
         motion.inner_mass, motion.inner_drag = (self._kept(part) for part in system.inner_shares)
         motion.first_mass, motion.first_drag = (self._kept(part) for part in system.first_shares)
+        if system.crossing is not None:
+            motion.cross, motion.coriolis = self._kept(system.crossing), self._crossed()
+            weight = system.place_weights[2]
+            motion.weights, motion.weight = len(weight), self._kept(weight)
+
+    def _crossed(self) -> c.Map:
+        """Coriolis forces of the rates of the quantities of all stages, each part of which has its stages together."""
+        system, stages = self._system, self._method.stages
+        assert system.coriolis is not None
+        one, parts = mapped(system.coriolis), [(0, system.linear), *system.ranges]
+        at = np.zeros((stages, system.layout.x), np.intp)
+        for begin, end in parts:
+            at[:, begin:end] = stages * begin + np.arange(stages * (end - begin)).reshape(stages, -1)
+        row, column = (at[:, part].ravel() for part in (one.row, one.column))
+        order, count = np.lexsort((column, row)), at.size
+        start = np.searchsorted(row[order], np.arange(count + 1))
+        value = np.tile(one.value, stages)[order]
+        return c.Map(count, count, *(self._kept(part) for part in (start, column[order], value)))
 
     def _matrix(self) -> CoreSystem:
         """Of which numbers the entries of the matrix of all stages are sums, and what solves with it."""
@@ -300,12 +317,13 @@ class CoreStep:
             yield np.concatenate(own)[np.argsort(members)].ravel()
 
     def _of_sliding(self, count: int) -> Index:
-        """Of numbers that couple stages, whose last are those of places that slide, where they are for the core."""
+        """Of numbers that couple stages where the core has them: those of places that slide are in its own order."""
         found = np.arange(count)
         if self._sliding:
             members = np.concatenate([group.members for group, _, _ in self._sliding])
-            last = found[count - len(members) * self._system.axes**2 :].reshape(len(members), -1)
-            last[members] = last.copy()
+            first, size = self._system.entry_places.sliding, len(members) * self._system.axes**2
+            own = found[first : first + size].reshape(len(members), -1)
+            own[members] = own.copy()
         return found
 
     def _shares(self) -> Iterator[tuple[Index, Index, Array]]:

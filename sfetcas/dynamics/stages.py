@@ -221,6 +221,8 @@ class StagePlaces:
         for matrix in (system.place_mass, system.place_drag):
             row, column = places_of(matrix.sparsity())
             coupled.add(system.of_places + row, system.of_places + column)
+        self.sliding = coupled.count
+        """Where the entries of places that slide begin among those that couple stages."""
         if (rubbing := system.rubbing) is not None:
             rubbed = tables.place_cells(rubbing.places)
             static.add(rubbed[:, None, :], rubbed[:, :, None])

@@ -278,7 +278,7 @@ class Sought(ctypes.Structure):
 class Observables(ctypes.Structure):
     """``sf_observables``."""
 
-    _fields_ = (("group", Group), ("mass", _pointer), ("damping", _pointer))
+    _fields_ = (("group", Group), ("mass", _pointer), ("damping", _pointer), ("vectors", _int))
 
 
 class Motion(ctypes.Structure):
@@ -298,7 +298,10 @@ class Motion(ctypes.Structure):
         *((name, _int) for name in ("entry_count", "iterations", "driven")),
         ("drive", _pointer),
         *((name, _int) for name in ("sliding", "further")),
-        ("slide", _pointer),
+        *((name, _pointer) for name in ("slide", "cross")),
+        ("coriolis", Map),
+        ("weights", _int),
+        ("weight", _pointer),
         *((name, _double) for name in ("dual", "last_change", "lost")),
     )
 
