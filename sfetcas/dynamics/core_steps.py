@@ -327,7 +327,7 @@ class CoreStep:
         return found
 
     def _shares(self) -> Iterator[tuple[Index, Index, Array]]:
-        """Forces of the observables onto the unknowns: which, the results that they are, weights."""
+        """Forces of observables, and on what slides, onto the unknowns: which, the results that they are, weights."""
         tables, layout, stages = self._system.tables, self._layout, self._method.stages
         pairs = zip(self._stiff, self._system.masses.observables, self._system.observed, strict=True)
         for (tape, begin), group, sides in pairs:
@@ -408,16 +408,12 @@ class CoreStep:
             data[:, :, columns] = memory.remembered[part].reshape(-1, len(columns))
         for data, counted in self._seen_data:
             data[:, :, -1] = memory.unwrapped[counted]
-        taken["given"][self._given_at] = factors @ self._given
-        taken["vector"][...] = factors @ self._turns
+        taken["given"][self._given_at] = _summed(factors, self._given)
+        taken["vector"][...] = _summed(factors, self._turns)
         taken["lam"][self._row_at] = memory.lam
-        taken["q"][...], taken["y"][...], taken["x"][...], taken["rate"][...] = (
-            memory.q,
-            memory.y,
-            memory.x,
-            memory.rates,
-        )
-        taken["turn"][...], taken["shift"][...] = turns, shifts
+        begun = {"q": memory.q, "y": memory.y, "x": memory.x, "rate": memory.rates, "turn": turns, "shift": shifts}
+        for name, values in begun.items():
+            taken[name][...] = values
         taken["unwrapped"][...] = memory.unwrapped[self._angle_of]
         if len(self._system.unilateral):
             switches, rubs, rubbing = memory.acting, memory.rubs, self._system.rubbing
@@ -440,6 +436,11 @@ class CoreStep:
         parts = [found[own] for own in self._parts]
         parts[2] = parts[2][self._row_at]
         return *parts, np.array([step.size]), np.array([step.iterations]), np.array([step.gap])
+
+
+def _summed(factors: Array, values: Array) -> Array:
+    """``factors @ values`` in one order of the sums, so that it has the same bits on every machine."""
+    return np.asarray((factors[:, :, None] * values).sum(axis=1))
 
 
 def _product(y: SparseMap, by_place: SparseMap) -> tuple[Index, Index, Array]:
