@@ -95,7 +95,7 @@ class Stepper:
         return Batch(self.function, 1)
 
     def step(self, memory: Memory, h: float) -> Taken:
-        """The step of length h, dimensionless, from a state; see :attr:`Taken.converged`."""
+        """The step of length h, dimensionless, from a state; see :attr:`.Taken.converged`."""
         system, method, n = self.system, self.method, self.system.layout
         stages, last = method.stages, memory.last
         # What jumps at the end of the step does so after it.

@@ -385,9 +385,10 @@ def _sliding(kind: Facing) -> ca.Function:
 
 @functools.cache
 def sliding_term(kind: Facing) -> ca.Function:
-    """``(u, data, v, lam) ->`` as of :func:`_sliding`, for the arguments of a term: :class:`Sliding` tells its data.
+    """``(u, data, v, lam) ->`` residual of the force of friction on a place; its derivatives by the place, lam, and v.
 
-    ``u`` (axes, 2) are displacements of the place and of what carries the obstacle, ``v`` the velocity relative to it.
+    ``data`` are those of :class:`Sliding`, ``u`` (axes, 2) displacements of the place and of what carries the obstacle,
+    ``v`` is the velocity relative to it.
     """
     own, axes = kind.sizes[3], kind.axes
     u, data, lam = ca.SX.sym("u", axes, 2), ca.SX.sym("data", own + 1 + axes), ca.SX.sym("lam")
