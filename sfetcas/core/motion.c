@@ -8,7 +8,6 @@
 
 #include <math.h>
 #include <stddef.h>
-#include <string.h>
 
 #include "core.h"
 
@@ -172,8 +171,19 @@ static void sf_switch(const sf_advance_of *a, int rows, double *value, int held)
   for (i = 0; i < rows; ++i) value[i] = (value[i] - (held ? a->held[i] : 0.0)) * a->acting[i];
 }
 
-/* Matrix entries that observables have by the quantities of another stage: J_i^T (b m + c d) J_j. */
-static double *sf_pairs(const sf_motion *o, const sf_point *p, int i, int j, double c, double b, double *to) {
+/* One row of what a matrix, repeated along leading vectors, makes of a column of derivatives; zero behind these. */
+static double sf_crossed(const sf_model *m, const double *cross, int vectors, const double *column, int row) {
+  int k, axes = m->axes;
+  double sum = 0.0;
+  if (row >= vectors * axes) return 0.0;
+  for (k = 0; k < axes; ++k) sum += cross[row % axes * axes + k] * column[row / axes * axes + k];
+  return sum;
+}
+
+/* Matrix entries that observables have by the quantities of another stage: J_i^T (b m + c d) J_j, or by Coriolis forces
+ * J_i^T c m (cross J_j). */
+static double *sf_pairs(const sf_model *m, const sf_motion *o, const sf_point *p, int i, int j, double c, double b,
+                        const double *cross, double *to) {
   int g, t, row, x, y;
   for (g = 0; g < o->groups; ++g) {
     const sf_observables *seen = o->observables + g;
@@ -188,7 +198,9 @@ static double *sf_pairs(const sf_motion *o, const sf_point *p, int i, int j, dou
         for (x = 0; x < width; ++x) {
           double sum = 0.0;
           for (row = 0; row < rows; ++row)
-            sum += one[x * rows + row] * ((b * mass[row] + c * damping[row]) * other[y * rows + row]);
+            sum += one[x * rows + row] *
+                   (cross ? c * mass[row] * sf_crossed(m, cross, seen->vectors, other + y * rows, row)
+                          : (b * mass[row] + c * damping[row]) * other[y * rows + row]);
           *to++ = sum;
         }
     }
@@ -240,39 +252,13 @@ static double *sf_by_velocity(const sf_model *m, const sf_group *group, int i, i
   return to;
 }
 
-/* One row of what a matrix, repeated along leading vectors, makes of a column of derivatives; zero behind these. */
-static double sf_crossed(const sf_model *m, const double *cross, int vectors, const double *column, int row) {
-  int k, axes = m->axes;
-  double sum = 0.0;
-  if (row >= vectors * axes) return 0.0;
-  for (k = 0; k < axes; ++k) sum += cross[row % axes * axes + k] * column[row / axes * axes + k];
-  return sum;
-}
-
 /* What Coriolis forces add to the entries that couple stages. */
 static double *sf_turning(const sf_model *m, const sf_motion *o, const sf_point *p, int i, int j, double c,
                           double *to) {
   const sf_group *element = m->group;
-  int g, t, e, x, y, k, side, row, axes = m->axes, n = m->points;
+  int t, e, x, y, k, side, row, axes = m->axes, n = m->points;
   int wide = o->massive ? (element->tape->results - element->jacobian) / axes : 0;
-  for (g = 0; g < o->groups; ++g) {
-    const sf_observables *seen = o->observables + g;
-    const sf_group *group = &seen->group;
-    int results = group->tape->results, rows = group->rows, count = group->terms / o->stages;
-    int width = (results - group->jacobian) / rows;
-    for (t = 0; t < count; ++t) {
-      const double *one = p->result + group->result + ((size_t)i * count + t) * results + group->jacobian;
-      const double *other = p->result + group->result + ((size_t)j * count + t) * results + group->jacobian;
-      for (y = 0; y < width; ++y)
-        for (x = 0; x < width; ++x) {
-          double sum = 0.0;
-          for (row = 0; row < rows; ++row)
-            sum += one[x * rows + row] * c * seen->mass[(size_t)t * rows + row] *
-                   sf_crossed(m, o->cross, seen->vectors, other + y * rows, row);
-          *to++ = sum;
-        }
-    }
-  }
+  to = sf_pairs(m, o, p, i, j, c, 0.0, o->cross, to);
   for (e = 0; e < o->massive; ++e) {
     const double *one = sf_of_element(m, o, p, i, e), *other = sf_of_element(m, o, p, j, e);
     for (y = 0; y < wide; ++y)
@@ -305,7 +291,7 @@ static void sf_couple(const sf_model *m, const sf_motion *o, const sf_advance_of
   for (i = 0; i < s; ++i)
     for (j = 0; j < s; ++j) {
       double c = o->velocity[i * s + j] / a->h, b = o->acceleration[i * s + j] / (a->h * a->h);
-      to = sf_pairs(o, p, i, j, c, b, to);
+      to = sf_pairs(m, o, p, i, j, c, b, NULL, to);
       to = sf_hung(m, o, p, i, j, c, b, to);
       for (k = 0; k < o->masses; ++k) *to++ = b * o->place_mass[k];
       for (k = 0; k < o->drags; ++k) *to++ = c * o->place_drag[k];
