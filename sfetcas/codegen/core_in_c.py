@@ -5,15 +5,17 @@ from __future__ import annotations
 import ctypes
 import functools
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from ..core.building import SOURCES
+from ..dynamics.core_steps import CoreStep
 from ..errors import SceneError
-from ..mathematics.arrays import Array
+from ..mathematics import core as c
+from ..mathematics.arrays import Array, Index
 from ..mathematics.core import TapeTable
 from ..mathematics.linear import factor_tables, last_rows, pivot_order
 from ..mathematics.source import table
@@ -22,20 +24,23 @@ from ..mechanics.evaluation import Handed, handed
 from ..parametric.equilibrium import EquilibriumSolver
 from .rendering import optimised
 
-__all__ = ["SolverTables", "core_in_c"]
+__all__ = ["SolverTables", "StepTables", "core_in_c"]
 
-PARTS = (("O3", ("core.h", "tape.c")), ("no-ivopts", ("states.c", "equations.c", "factors.c", "afar.c")))
-"""What generated C needs of the core, in the order in which ``core.c`` has it, and how GCC is to optimise it.
-
-Most of the time goes into tapes, which need all that it can; what else it tries takes half of the time to compile.
-"""
+EQUATIONS = ("states.c", "equations.c", "factors.c")
+"""What every kind of generated C takes of the core beside tapes."""
 
 
 @functools.cache
-def core_in_c() -> list[str]:
-    """The sources of the core that a solver takes, as static C without comments."""
+def core_in_c(method: str) -> list[str]:
+    """The sources of the core that a solver or a time step takes, as static C without comments.
+
+    ``method`` is the last of them.
+    """
     done = set[str]()
-    return [optimised(level, _plain("\n".join(_included(name, done) for name in names))) for level, names in PARTS]
+    # Most of the time goes into tapes, which need all that GCC can; what else it tries takes half of the time to
+    # compile.
+    parts = (("O3", ("core.h", "tape.c")), ("no-ivopts", (*EQUATIONS, method)))
+    return [optimised(level, _plain("\n".join(_included(name, done) for name in names))) for level, names in parts]
 
 
 def _plain(text: str) -> str:
@@ -124,6 +129,10 @@ class InC:
                 parts.append(repr(value) if np.isfinite(value) else "HUGE_VAL")
         return f"{{{', '.join(parts)}}}"
 
+    def groups(self, groups: Iterable[ctypes.Structure], varying: Sequence[int]) -> list[str]:
+        """The initialisers of groups of terms; of some of them the data are given later."""
+        return [self.value(one, **({"datum": "0"} if i in varying else {})) for i, one in enumerate(groups)]
+
     def pointer(self, address: int) -> str:
         """What is at an address, by its name."""
         if address not in self._names:
@@ -166,12 +175,8 @@ class InC:
         return self._known[key]
 
 
-class SolverTables:
-    """What the core takes of an equilibrium solver: definitions in C, sizes, and how much memory a solve takes.
-
-    Parameters
-    ----------
-    solver : EquilibriumSolver
+class _Tables:
+    """What the core takes of a model for generated C: definitions, sizes, and how much memory a call takes.
 
     Attributes
     ----------
@@ -179,13 +184,64 @@ class SolverTables:
         Sizes by their names in the driver.
     texts : list of str
         Definitions of structures and tables.
+    numbers, whole : int
+        Doubles and whole numbers of the memory of a call.
+    """
+
+    def __init__(self) -> None:
+        self.constants, self.texts = dict[str, int](), list[str]()
+        self.numbers = self.whole = 0
+
+    def _write(self, text: InC, structures: Mapping[str, str], lists: Mapping[str, Sequence[str]]) -> None:
+        """Enter tables, arrays of structures, and structures."""
+        self.texts += text.tables
+        for name, values in lists.items():
+            inner = f",{chr(10)}  ".join(values) or "0"
+            self.texts.append(f"static const {name}[] = {{\n  {inner}\n}};\n")
+        self.texts += [f"static const {name} = {value};\n" for name, value in structures.items()]
+
+    def _enter(self, **tables: Array) -> None:
+        """Enter tables of whole numbers by their names."""
+        self.texts += [table(f"sf_{name}", values, "int") for name, values in tables.items()]
+
+    def _vary(self, varying: Sequence[int], sizes: Sequence[int], inputs: int, stages: int = 1) -> None:
+        """Enter which groups of terms have data among the inputs, and how many; both are needed for all stages."""
+        self._enter(varying=np.array(varying, np.intp), counts=np.array(sizes, np.intp))
+        self.constants |= {"VARYING": len(varying), "INPUTS": inputs}
+        self.numbers += stages * (sum(sizes) + inputs)
+
+    def _pivot(self, n: int, row: Index, column: Index, order: Array) -> None:
+        """Enter what factors with pivots take; those of orthogonal factors hold them, whatever the pivots are (George
+        and Ng 1985).
+        """
+        own = ca.Sparsity.triplet(n, n, row.tolist(), np.argsort(order)[column].tolist())
+        room = n + max((part.nnz() for part in own.qr_sparse(False)[:2]), default=0) if n else 1
+        self._enter(order_with_pivots=order)
+        self.constants["ROOM"] = room
+        self.numbers += 2 * room + 2 * n
+        self.whole += 2 * room + 8 * n + 2
+
+
+def _of_point(structure: c.Model, results: int) -> int:
+    """Numbers of results, places and pulls at a state."""
+    return results + structure.places * structure.axes + structure.elements * structure.points * structure.axes
+
+
+class SolverTables(_Tables):
+    """What the core takes of an equilibrium solver.
+
+    Parameters
+    ----------
+    solver : EquilibriumSolver
+
+    Attributes
+    ----------
     sizes : dict
         What the core says of its memory: ``sf_work_size``, ``sf_find_size``.
-    numbers, whole : int
-        Doubles and whole numbers of the memory of a solve.
     """
 
     def __init__(self, solver: EquilibriumSolver) -> None:
+        super().__init__()
         method, inputs = solver.method, solver.method.inputs
         equations, model = method.equations, solver.model
         known = handed(equations.layout, model, equations.noise)
@@ -201,55 +257,71 @@ class SolverTables:
         few = {group.tape for group in known.groups if group.terms <= FEW}
         few |= {rules.convex} if convex is not None and known.groups[0].terms <= FEW else set()
         text, n = InC(points, few), structure.total
-        groups = [
-            text.value(group, **({"datum": "0"} if number in varying else {}))
-            for number, group in enumerate(known.groups)
-        ]
         structures = {
             "sf_model sf_the_model": text.value(structure, group="0"),
             "sf_rules sf_the_rules": text.value(rules),
             "sf_inputs sf_the_inputs": text.value(given, count="0", datum="0"),
         }
-        factors = factor_tables(n, equations.row, equations.column)
-        room, order = 0, pivot_order(n, equations.row, equations.column, last_rows(equations.rows))
-        if method.pivoted and n:
-            # Those of orthogonal factors hold them, whatever the pivots are: George and Ng 1985.
-            columns = np.argsort(order)[equations.column].tolist()
-            whole = ca.Sparsity.triplet(n, n, equations.row.tolist(), columns)
-            room = n + max(part.nnz() for part in whole.qr_sparse(False)[:2])
-        sizes = [model.terms[number].data.size for number in varying]
-        self.texts = [
-            *text.tables,
-            f"static const sf_group sf_groups[] = {{\n  {(',' + chr(10) + '  ').join(groups)}\n}};\n",
-            *(f"static const {name} = {value};\n" for name, value in structures.items()),
-            *(
-                table(name, values, "int")
-                for name, values in zip(
-                    ("sf_start_of_columns", "sf_rows", "sf_order", "sf_place_in_order", "sf_varying", "sf_counts"),
-                    (*factors, np.array(varying), np.array(sizes)),
-                    strict=True,
-                )
-            ),
-            *([table("sf_order_with_pivots", order, "int")] if room else []),
-            table("sf_start", solver.start if solver.start is not None else np.zeros(0)),
-        ]
-        count, below = method.states, _filled(n, factors)
-        self.constants = {
+        self._write(text, structures, {"sf_group sf_groups": text.groups(known.groups, varying)})
+        self._vary(varying, [model.terms[number].data.size for number in varying], inputs.size)
+        names = ("start_of_columns", "rows", "order", "place_in_order")
+        factors, count = factor_tables(n, equations.row, equations.column), method.states
+        self._enter(**dict(zip(names, factors, strict=True)))
+        self.texts.append(table("sf_start", solver.start if solver.start is not None else np.zeros(0)))
+        below = _filled(n, factors)
+        self.constants |= {
             "TOTAL": n,
             "STATE": count,
             "STARTED": int(solver.start is not None),
-            "GROUPS": len(groups),
-            "VARYING": len(varying),
-            "INPUTS": inputs.size,
+            "GROUPS": len(known.groups),
             "FILLED": below,
-            "ROOM": room,
+            "ROOM": 0,
         }
         self.sizes = {"work": _work_size(known), "find": _find_size(known, convex, inputs.size, count)}
-        elements = structure.elements * structure.points * structure.axes
-        of_point = structure.results + structure.places * structure.axes + elements + self.sizes["work"]
-        self.numbers = sum(sizes) + inputs.size + count + of_point + below + 2 * n
-        self.numbers += (2 * room + 2 * n) * bool(room) + self.sizes["find"]
-        self.whole = 5 * n + 1 + below + (2 * room + 8 * n + 2) * bool(room)
+        self.numbers += count + _of_point(structure, structure.results) + sum(self.sizes.values()) + below + 2 * n
+        self.whole += 5 * n + 1 + below
+        if method.pivoted and n:
+            order = pivot_order(n, equations.row, equations.column, last_rows(equations.rows))
+            self._pivot(n, equations.row, equations.column, order)
+
+
+class StepTables(_Tables):
+    """What the core takes of a time step.
+
+    Parameters
+    ----------
+    step : CoreStep
+    """
+
+    def __init__(self, step: CoreStep) -> None:
+        super().__init__()
+        known, motion, flat, varying = step.handed, step.motion, step.flat, step.inputs.varying
+        structure, stages = known.structure, motion.stages
+        few = {group.tape for group in step.groups if group.terms <= FEW}
+        text = InC(step.arrays, few)
+        structures = {
+            "sf_model sf_the_model": text.value(structure, group="0"),
+            "sf_motion sf_the_motion": text.value(
+                motion, turning="0", rows="0", slide="0", seen="sf_seen", observables="sf_observed"
+            ),
+            "sf_flat sf_the_flat": text.value(flat, datum="0"),
+            "sf_group sf_the_turning": text.value(step.turning, datum="0"),
+        }
+        lists = {
+            "sf_group sf_groups": text.groups(known.groups, varying),
+            "sf_group sf_further": text.groups(step.rows, varying),
+            "sf_group sf_seen": [text.value(group) for group in step.seen],
+            "sf_observables sf_observed": [text.value(one) for one in step.observables],
+        }
+        self._write(text, structures, lists)
+        n, row, column, order = step.pattern
+        sizes = [known.data[number].size // stages for number in varying]
+        self._vary(varying, sizes, step.inputs.size, stages)
+        start, rows, *_ = factor_tables(n, row, column)
+        self._enter(start_of_columns=start, rows=rows)
+        self._pivot(n, row, column, order)
+        self.constants |= {"TOTAL": n, "GROUPS": len(known.groups), "ENTRIES": len(row), "RESULTS": step.results}
+        self.numbers += n + _of_point(structure, step.results) + step.room
 
 
 def _filled(n: int, factors: list[Array]) -> int:

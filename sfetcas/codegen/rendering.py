@@ -6,7 +6,7 @@ import abc
 import json
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
 
@@ -30,7 +30,7 @@ from ..quoting import (
     shell_word,
 )
 
-__all__ = ["Status", "Writer", "enumerated", "filled", "numbers", "optimised", "row", "rows", "template"]
+__all__ = ["Status", "Writer", "defined", "enumerated", "filled", "numbers", "optimised", "row", "rows", "template"]
 
 Status = tuple[str, int, str]
 """A result code of a call in C: name, number, meaning."""
@@ -71,6 +71,11 @@ def enumerated(values: Sequence[Status]) -> str:
     return "\n".join(
         f"  {n} = {v}{end} /* {c_comment(what)} */" for (n, v, what), end in zip(values, ends, strict=True)
     )
+
+
+def defined(constants: Mapping[str, float]) -> str:
+    """Constants in C by their names."""
+    return "".join(f"#define SF_{key} {value!r}\n" for key, value in constants.items())
 
 
 def numbers(values: Array) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..description.scene import Scene, check_scene
 from ..description.showing import shown
+from ..dynamics.core_steps import CoreStep, core_step
 from ..dynamics.impulses import Impulsive
 from ..dynamics.inertia import Inertia
 from ..dynamics.inertialess import refuse_spinning
@@ -45,7 +46,7 @@ IMPACT = re.compile(r"contacts\..+\.(restitution|friction)")
 
 @dataclass(frozen=True, eq=False)
 class TimeStep:
-    """A step of one scene on one mesh by one method; the same CasADi functions run in process and in C.
+    """A step of one scene on one mesh by one method, the same in process and in C: that of the core, or of CasADi.
 
     Attributes
     ----------
@@ -102,6 +103,22 @@ class TimeStep:
     def openings(self) -> int:
         """How many numbers a state has of gaps and their rates."""
         return self.method.openings(self.system) if isinstance(self.method, Impulsive) else 0
+
+    @functools.cached_property
+    def by_core(self) -> CoreStep | None:
+        """The step by the core; None where it is one by CasADi's functions."""
+        # A state has angles that count turns, and nothing else that is remembered.
+        plain = self.system.layout.unwrapped == self.model.unwrapping.count
+        found = core_step(self.system, self.method) if plain else None
+        if found is not None:
+            found.prefer_pivots_of(self.system.rows(self._values(None)), self.usual / self.time, self.begin)
+        return found
+
+    @property
+    def usual(self) -> float:
+        """Length of steps that the scene asks for, s."""
+        analysis = self.scene.analysis
+        return float(analysis.step or analysis.duration / 1000.0)
 
     @functools.cached_property
     def _step(self) -> ca.Function:
@@ -171,13 +188,21 @@ class TimeStep:
         arguments : ndarray (numbers,) or (times, numbers), optional
             Constant during the step, or at its :attr:`times`; by default the values of the scene.
         """
-        p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
-        p = np.broadcast_to(p, (len(self.times), self.arguments.defaults.size))
+        p = self._values(arguments)
         if not all(map(self.arguments.accepted, p)):
             return np.full(len(state), np.nan)
-        after, size, _, _ = (np.array(part).ravel() for part in self.advance(state, h, p.T))
-        good = size[0] <= LAST_CHANGE and np.isfinite(after).all()
+        if self.by_core is not None:
+            after, size, *_ = self.by_core.after(self.system.rows(p), h / self.time, state)
+        else:
+            found = self.advance(state, h, p.T)
+            after, size = np.array(found[0]).ravel(), float(found[1])
+        good = size <= LAST_CHANGE and np.isfinite(after).all()
         return after if good else np.full(len(state), np.nan)
+
+    def _values(self, arguments: Array | None) -> Array:
+        """Values (times, numbers) of the arguments at the times of a step; by default those of the scene."""
+        p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
+        return np.broadcast_to(p, (len(self.times), self.arguments.defaults.size))
 
     def outputs(self, state: Array, arguments: Array | None = None) -> Array:
         """The results (results,) at a state, in their SI units."""

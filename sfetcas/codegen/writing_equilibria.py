@@ -13,7 +13,7 @@ from ..parametric.equilibrium import EquilibriumSolver
 from ..parametric.watching import LEAST
 from ..solvers.globalised import MEANINGS, Code
 from .core_in_c import SolverTables, core_in_c
-from .rendering import Status, Writer, filled, row, rows, template
+from .rendering import Status, Writer, defined, filled, row, rows, template
 
 __all__ = ["EquilibriumWriter"]
 
@@ -32,7 +32,7 @@ class EquilibriumWriter(Writer):
     def __init__(self, solver: EquilibriumSolver, *, sensitivities: bool = False) -> None:
         super().__init__(solver.name, solver.scene, solver.arguments, solver.results)
         self.solver, self._sensitivities = solver, sensitivities
-        self.bodies = ("solver.c", "sensitivities.c") if sensitivities else ("solver.c",)
+        self.bodies = ("memory.c", "solver.c", *(["sensitivities.c"] if sensitivities else []))
 
     @property
     def functions(self) -> list[ca.Function]:
@@ -107,8 +107,7 @@ class EquilibriumWriter(Writer):
     def tables(self) -> list[str]:
         """The core, ranges of arguments, and all that it takes of the model."""
         constants = self._tables.constants | {"MARGINS": self._margins, "LEAST": LEAST}
-        defined = "\n".join(f"#define SF_{key} {value!r}" for key, value in constants.items()) + "\n"
-        return [*core_in_c(), defined, *self.ranges, *self._tables.texts]
+        return [*core_in_c("afar.c"), defined(constants), *self.ranges, *self._tables.texts]
 
     @property
     def cases(self) -> dict[str, object]:

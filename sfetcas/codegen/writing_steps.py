@@ -9,8 +9,10 @@ import numpy as np
 
 from ..description.records import counted
 from ..dynamics.steps import LAST_CHANGE
+from ..mathematics.linear import SOLVED
 from ..mathematics.source import table
-from .rendering import Status, Writer, filled, row, rows, template
+from .core_in_c import StepTables, core_in_c
+from .rendering import Status, Writer, defined, filled, row, rows, template
 from .timestep import TimeStep
 
 __all__ = ["StepWriter"]
@@ -34,16 +36,22 @@ class StepWriter(Writer):
     """The files of a time step."""
 
     header, example, check = "step.h", "step_main.c", "step_check.c"
-    loader, readme, bodies = "step_loader.py.in", "step_README.md", ("step.c",)
+    loader, readme = "step_loader.py.in", "step_README.md"
 
     def __init__(self, step: TimeStep) -> None:
         super().__init__(step.name, step.scene, step.arguments, step.results)
-        self.step = step
+        self.step, by_core = step, step.by_core
+        self._tables = None if by_core is None else StepTables(by_core)
+        self.bodies = ("step_by_casadi.c", "step.c")
+        if by_core is not None:
+            # What CasADi's functions are for takes little time, and most of that to compile.
+            self.optimisation, self.bodies = "Og", ("memory.c", "step_by_core.c", "step.c")
 
     @property
     def functions(self) -> list[ca.Function]:
-        """The step, and the results at a state."""
-        return [self.step.advance, self.step.output]
+        """The step, or what it depends on, and the results at a state."""
+        step = self.step
+        return [step.advance if step.by_core is None else step.system.row, step.output]
 
     def more(self, values: dict[str, object]) -> dict[str, str]:
         """The Python script that makes an FMI unit of the step."""
@@ -71,8 +79,12 @@ class StepWriter(Writer):
 
     @property
     def memory(self) -> int:
-        """Number of doubles for the state after a step, its arguments, and three numbers about its convergence."""
-        return max(1, self.states) + self._columns + 3
+        """Number of doubles for the state after a step, its arguments, three numbers about its convergence, what the
+        core needs.
+        """
+        tables = self._tables
+        of_core = 0 if tables is None else tables.numbers + tables.whole // 2 + 1
+        return max(1, self.states) + self._columns + 3 + of_core
 
     @property
     def _columns(self) -> int:
@@ -83,22 +95,20 @@ class StepWriter(Writer):
         """Method, sizes, usual length of a step, and words about the model."""
         flexible = counted(self.model.mesh.elements, f"{self.model.element.name} element")
         unknowns = counted(self.arguments.expressions.total, "unknown")
+        tables, declared = self._tables, ""
+        if tables is not None:
+            declared = f"\n  double numbers[{tables.numbers}];\n  int whole[{tables.whole}];"
         return {
+            "core_declared": declared,
             "method": self.step.method.name,
             "n_times": len(self.step.times),
             "sz_p": self._columns,
             "sz_one": max(1, len(self.arguments.defaults)),
             "indent": " " * len(f"int {self.name}_step("),
             "indent_through": " " * len(f"int {self.name}_step_through("),
-            "usual_step": repr(self.usual),
+            "usual_step": repr(self.step.usual),
             "model_in_words": f"In {self.where}: {flexible}, {unknowns} at each stage.",
         }
-
-    @property
-    def usual(self) -> float:
-        """Length of the steps of the check, s."""
-        analysis = self.scene.analysis
-        return float(analysis.step or analysis.duration / 1000.0)
 
     @property
     def about(self) -> dict[str, Any]:
@@ -108,13 +118,19 @@ class StepWriter(Writer):
 
     @property
     def tables(self) -> list[str]:
-        """The first state, the times within a step at which arguments are needed, and the limit of convergence."""
-        converged = f"#define SF_CONVERGED {LAST_CHANGE!r}\n"
+        """The first state, the times within a step at which arguments are needed, the limit of convergence; the core
+        and what it takes.
+        """
+        constants: dict[str, float] = {"CONVERGED": LAST_CHANGE}
+        if self._tables is not None:
+            constants |= self._tables.constants | {"SOLVED_TO": SOLVED, "TIME": self.step.time}
+        of_core = [] if self._tables is None else [*core_in_c("motion.c"), *self._tables.texts]
         return [
-            converged,
+            *of_core,
+            defined(constants),
             *self.ranges,
             table("sf_begin", self.step.begin),
-            table("sf_times", self.step.times),
+            table("sf_loaded", self.step.times),
         ]
 
     @property
@@ -125,7 +141,7 @@ class StepWriter(Writer):
         for number in range(CHECKED):
             shares = 1.0 + 0.01 * (number + step.times)
             p = np.clip(shares[:, None] * self.arguments.defaults, *self.limits)
-            state = step.step(state, self.usual, p)
+            state = step.step(state, step.usual, p)
             arguments.append(p.ravel())
             results.append(step.outputs(state, p[-1]))
         return {

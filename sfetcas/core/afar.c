@@ -75,7 +75,6 @@ int sf_find_size(const sf_model *m, const sf_rules *rules, const sf_inputs *inpu
   return sf_make_run(m, rules, inputs, NULL, &none);
 }
 
-static int sf_is_finite(double x) { return x - x == 0.0; }
 
 static void sf_look(sf_run_of *run, sf_here *here) {
   const sf_model *m = run->m;
@@ -457,13 +456,6 @@ static int sf_followed(sf_run_of *run, const double *row, int *negative) {
     return run->seed ? status : sf_from(run, negative);
   }
   return status;
-}
-
-static int sf_all_finite(const double *x, int n) {
-  int i;
-  for (i = 0; i < n; ++i)
-    if (!sf_is_finite(x[i])) return 0;
-  return 1;
 }
 
 /* An equilibrium for a row of inputs, in place of a state (numbers,).

@@ -34,6 +34,7 @@ int sf_sizes(int *sizes) {
   sizes[18] = (int)sizeof(sf_observables);
   sizes[19] = (int)sizeof(sf_motion);
   sizes[20] = (int)sizeof(sf_advance_of);
-  sizes[21] = SF_OPERATIONS;
+  sizes[21] = (int)sizeof(sf_flat);
+  sizes[22] = SF_OPERATIONS;
   return 0;
 }

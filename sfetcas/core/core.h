@@ -11,7 +11,7 @@
 #ifndef SFETCAS_CORE_H
 #define SFETCAS_CORE_H
 
-#define SF_VERSION 5
+#define SF_VERSION 6
 
 #ifdef _WIN32
 #define SF_PUBLIC __declspec(dllexport)
@@ -335,7 +335,7 @@ typedef struct {
   const double *velocity_kept, *acceleration_kept, *after_kept; /* (stages, kept) twice, (kept, kept) */
   const int *power;                 /* (kept,) p: 1 or 2 */
   const sf_group *turning;          /* tangents of elements, turned */
-  const double *tangent;            /* (elements, points, axes) undeformed ones */
+  int tangent;                      /* where undeformed ones, (points, axes), begin in the data of an element */
   const sf_group *seen, *rows;      /* values of the observables; of the rows of the model's groups */
   const sf_observables *observables;
   sf_map by_place, by_tangent, onto_pull, onto_places, mass, drag;
@@ -370,8 +370,25 @@ typedef struct {
   int iterations;
 } sf_advance_of;
 
+/* What a step takes and tells as rows of numbers: numbers of sf_inputs for each stage, and flat states. */
+typedef struct {
+  int inputs, groups;    /* numbers of a row; groups with data that vary */
+  const int *count;      /* (groups,) of how many numbers at one stage */
+  double *const *datum;  /* (groups,) where the model has those of all stages */
+  const int *given;      /* (stages, given) where what is given at each stage stands among that of all */
+  const int *row;        /* (stages, rows) the same of multipliers */
+  int angles, counts;    /* angles of a state, and of all terms at all stages */
+  const int *angle;      /* (counts,) which of the state's these are */
+  const int *pivots;     /* of the matrix of some step, as of sf_pivots: most steps have them; NULL */
+} sf_flat;
+
 SF_PUBLIC int sf_advance_size(const sf_model *model, const sf_motion *motion);
 SF_PUBLIC int sf_advance(const sf_model *model, const sf_motion *motion, sf_system *system, sf_advance_of *step,
                          sf_point *point, double *memory);
+SF_PUBLIC int sf_pivots(const sf_pivoted *factors, int *pivots);
+SF_PUBLIC int sf_take_step_size(const sf_model *model, const sf_motion *motion, const sf_flat *flat);
+SF_PUBLIC int sf_take_step(const sf_model *model, const sf_motion *motion, const sf_flat *flat, sf_system *system,
+                           double h, const double *inputs, const double *state, double *after, sf_point *point,
+                           double *memory, sf_advance_of *step);
 
 #endif

@@ -63,10 +63,14 @@ int sf_advance_size(const sf_model *m, const sf_motion *o) { return sf_make_stag
 /* By how much turned tangents differ from those of the undeformed structure. */
 static void sf_tangents(const sf_model *m, const sf_motion *o, const sf_state *s, const double *given, sf_point *p,
                         const sf_work *work, double *tangents) {
-  int i, n = m->elements * m->points * m->axes;
-  if (!n) return;
-  sf_terms(m, o->turning, 0, s, given, p, work);
-  for (i = 0; i < n; ++i) tangents[i] = p->result[o->turning->result + i] - o->tangent[i];
+  const sf_group *turning = o->turning;
+  int e, k, n = m->points * m->axes;
+  if (!m->elements) return;
+  sf_terms(m, turning, 0, s, given, p, work);
+  for (e = 0; e < m->elements; ++e) {
+    const double *tangent = turning->datum + (size_t)e * turning->data + o->tangent;
+    for (k = 0; k < n; ++k) *tangents++ = p->result[turning->result + (size_t)e * n + k] - tangent[k];
+  }
 }
 
 /* All quantities at all stages. */
@@ -511,5 +515,78 @@ int sf_advance(const sf_model *m, const sf_motion *o, sf_system *system, sf_adva
   sf_moved_by(o, a->x, room.moved);
   a->gap = sf_gap(m, o, a, &room.state[here], p, &work, &room);
   sf_told(m, o, scale, &room.state[here], a, &room);
+  return 0;
+}
+
+/* ---- steps of flat states --------------------------------------------------------------------------- */
+
+int sf_take_step_size(const sf_model *m, const sf_motion *o, const sf_flat *f) {
+  return sf_advance_size(m, o) + m->given + 3 * o->driven + 2 * m->rows + f->counts + o->stages * o->quantities;
+}
+
+/* The state after a step from a state, both of what a step takes from the one before: rotations, displacements,
+ * multipliers, what rotations and displacements gained in its stages, quantities, their rates, angles, and its length,
+ * 0 for a restart.  inputs (stages, f->inputs); else as sf_advance.
+ */
+int sf_take_step(const sf_model *m, const sf_motion *o, const sf_flat *f, sf_system *system, double h,
+                 const double *inputs, const double *state, double *after, sf_point *p, double *memory,
+                 sf_advance_of *a) {
+  int n = o->stages, i, k, g, broken;
+  int rotations = m->rotations / n, y = m->displacements / n, rows = m->rows / n, given = m->given / n;
+  int turned = 3 * o->driven / n, quantities = o->quantities;
+  double *all = memory, *vector = all + m->given, *begun = vector + 3 * o->driven, *found = begun + m->rows;
+  double *near = found + m->rows, *there = near + f->counts, *own = after;
+  const double *lam, *angle;
+#define PART(from, count) \
+  a->from = state; \
+  state += (count)
+  PART(q, m->components * rotations);
+  PART(y, y);
+  lam = state;
+  state += rows;
+  PART(turn, m->turning * m->rotations);
+  PART(shift, m->displacements);
+  PART(x, quantities);
+  PART(rate, o->kept * quantities);
+#undef PART
+  angle = state;
+  for (i = 0; i < n; ++i) {
+    for (g = 0; g < f->groups; ++g) {
+      sf_copy(f->datum[g] + (size_t)i * f->count[g], inputs, f->count[g]);
+      inputs += f->count[g];
+    }
+    for (k = 0; k < given; ++k) all[f->given[i * given + k]] = inputs[k];
+    inputs += given;
+    sf_copy(vector + i * turned, inputs, turned);
+    inputs += turned + f->angles;
+    for (k = 0; k < rows; ++k) begun[f->row[i * rows + k]] = lam[k];
+  }
+  for (k = 0; k < f->counts; ++k) near[k] = angle[f->angle[k]];
+  a->h = h;
+  a->ratio = angle[f->angles] > 0.0 ? h / angle[f->angles] : 0.0;
+  a->given = all;
+  a->vector = vector;
+  a->lam = begun;
+  a->unwrapped = near;
+  a->acting = a->held = NULL;
+  a->last_q = own;
+  a->last_y = own += m->components * rotations;
+  lam = own += y;
+  a->turns = own += rows;
+  a->shifts = own += m->turning * m->rotations;
+  own += m->displacements;
+  a->rates = own + quantities;
+  a->rows = found;
+  a->there = there;
+  /* A step hangs on its state alone, not on which matrix was solved last. */
+  system->pivoted->known = 0;
+  if (f->pivots) sf_take_pivots(system->pivoted, f->pivots);
+  broken = sf_advance(m, o, system, a, p, there + n * quantities);
+  if (broken) return broken;
+  sf_copy(own, there + (size_t)(n - 1) * quantities, quantities);
+  own = a->rates + (size_t)o->kept * quantities;
+  for (k = 0; k < rows; ++k) after[lam - after + k] = found[f->row[(n - 1) * rows + k]];
+  for (k = 0; k < f->angles; ++k) *own++ = sf_counted(m, k, after, angle[k]);
+  *own = h;
   return 0;
 }

@@ -129,6 +129,40 @@ static int sf_pivot_again(sf_pivoted *f, const double *entries) {
   return 0;
 }
 
+/* Which pivots the last factors have, and their patterns, one after the other: the number of these numbers; 0 where no
+ * matrix was factorised.  pivots: NULL, or so many.
+ */
+int sf_pivots(const sf_pivoted *f, int *pivots) {
+  int n = f->n, k, l = 0, number;
+  const int *part[6], size[6] = {n, n, n + 1, n + 1, f->known ? f->lower[n] : 0, f->known ? f->upper[n] : 0};
+  if (!f->known) return 0;
+  part[0] = f->place;
+  part[1] = f->row_of;
+  part[2] = f->lower;
+  part[3] = f->upper;
+  part[4] = f->lower_row;
+  part[5] = f->upper_row;
+  for (number = 0; number < 6; ++number)
+    for (k = 0; k < size[number]; ++k, ++l)
+      if (pivots) pivots[l] = part[number][k];
+  return l;
+}
+
+/* Take these pivots for the next matrix. */
+static void sf_take_pivots(sf_pivoted *f, const int *pivots) {
+  int n = f->n, k;
+  for (k = 0; k < n; ++k) {
+    f->place[k] = *pivots++;
+    f->x[k] = 0.0;
+  }
+  for (k = 0; k < n; ++k) f->row_of[k] = *pivots++;
+  for (k = 0; k <= n; ++k) f->lower[k] = *pivots++;
+  for (k = 0; k <= n; ++k) f->upper[k] = *pivots++;
+  for (k = 0; k < f->lower[n]; ++k) f->lower_row[k] = *pivots++;
+  for (k = 0; k < f->upper[n]; ++k) f->upper_row[k] = *pivots++;
+  f->known = 1;
+}
+
 /* The solution in place of a right side. */
 static void sf_pivoted_backward(const sf_pivoted *f, double *x, double *work) {
   int n = f->n, k, p;

@@ -24,6 +24,15 @@ static void sf_lay_out(const sf_model *m, double *numbers, sf_state *state) {
 
 static void sf_copy(double *to, const double *from, int n) { memcpy(to, from, (size_t)n * sizeof(double)); }
 
+static int sf_is_finite(double x) { return x - x == 0.0; }
+
+static int sf_all_finite(const double *x, int n) {
+  int i;
+  for (i = 0; i < n; ++i)
+    if (!sf_is_finite(x[i])) return 0;
+  return 1;
+}
+
 static void sf_copy_state(const sf_model *m, const sf_state *from, sf_state *to) {
   sf_copy(to->q, from->q, m->components * m->rotations);
   sf_copy(to->y, from->y, m->displacements);

@@ -7,6 +7,7 @@ core, and for generated C.
 from __future__ import annotations
 
 import ctypes
+import functools
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,6 @@ from ..mathematics.constants import mapped
 from ..mathematics.linear import NO_ROOM, CoreSystem, SparseMap, last_rows
 from ..mathematics.tapes import Tape, tape_of
 from ..mechanics.evaluation import CoreModel, Handed, cells, core_layout
-from ..mechanics.rotations import RotationFreedom
 from ..mechanics.rubbing import Sliding, sliding_term
 from ..mechanics.terms import rotation_gradient, rows_of
 from .methods import Method, StageMethod
@@ -32,11 +32,8 @@ __all__ = ["CoreStep", "core_step"]
 
 
 def core_step(system: StageEquations, method: Method) -> CoreStep | None:
-    """Steps of a method by the core; None where there is or is to be none, or something acts that it does not know."""
-    library = c.core()
-    if library is None or system.kernels not in ("auto", "core"):
-        return None
-    if not isinstance(method, StageMethod) or method.polished:
+    """Steps of a method by the core; None where there is none, or something acts that it does not know."""
+    if c.core() is None or not isinstance(method, StageMethod) or method.polished:
         return None
     layout, model = system.equations.layout, system.model
     copies = core_layout(layout, model, method.stages)
@@ -71,6 +68,19 @@ class CoreStep:
     tapes : list of Tape
         Of the observables their values, then these with derivatives; of the groups of connections that have rows these;
         of places that slide their forces.
+
+    Attributes
+    ----------
+    handed : Handed
+        The model of all stages; ``motion`` is what the core takes beside it.
+    inputs : Inputs
+        What is given at a stage.
+    turning : Group
+        Turned tangents of the elements.
+    seen, rows, observables : arrays of Group and Observables
+        Values of the observables, rows of the groups of terms of the model, the observables.
+    pattern : tuple
+        Number of unknowns of all stages, positions of the entries of their matrix, and the order of elimination.
     """
 
     def __init__(self, system: StageEquations, method: StageMethod, turning: Tape | None, tapes: list[Tape]) -> None:
@@ -80,13 +90,13 @@ class CoreStep:
         known = core_layout(system.equations.layout, system.model, method.stages)
         self._layout = layout = known.beside()
         total = layout.model.total
-        self._handed = Handed(known, system.model, np.zeros(total))
+        self.handed = Handed(known, system.model, np.zeros(total))
         # Within a step angles are counted from what they are at its begin.
-        self._handed.structure.angles = 0
-        self._model = CoreModel(library, self._handed)
+        self.handed.structure.angles = 0
+        self._model = CoreModel(library, self.handed)
         # What the tables point to.
         self._arrays = list[Any]()
-        self._motion = motion = c.Motion(
+        self.motion = motion = c.Motion(
             stages=method.stages,
             kept=method.kept,
             quantities=system.layout.x,
@@ -113,15 +123,12 @@ class CoreStep:
 
     def _kept(self, values: Array) -> int:
         """Address of numbers, whole ones or not, that live as long as this."""
-        found = (c.integers if values.dtype.kind in "iub" else c.doubles)(values)
-        self._arrays.append(found)
-        return int(found.ctypes.data)
+        return self._layout.kept((c.integers if values.dtype.kind in "iub" else c.doubles)(values))
 
     def _number(self) -> None:
         """Where what belongs to each stage stands among that of all of them, and what is given by a unit of factors."""
         system, layout, stages = self._system, self._layout, self._method.stages
-        equations, model = system.equations, system.model
-        given = equations.layout.given
+        model, given = system.model, system.equations.layout.given
         every = layout.unknowns(np.arange(system.total)).reshape(stages, -1)
         self._unknown = every
         at = [
@@ -130,12 +137,10 @@ class CoreStep:
             for name, part in given.items()
         ]
         self._given_at = np.concatenate(at, axis=1)
-        self._given = np.stack([equations.given(loading) for loading in system.loadings])
-        driven = np.any([group.turn.any(axis=1) for group in model.groups.values()], axis=0)
-        self._driven = np.flatnonzero(driven & (model.rotations.kind == RotationFreedom.FIXED))
-        self._turns = np.stack([loading.turn[self._driven].ravel() for loading in system.loadings])
-        self._motion.driven = stages * len(self._driven)
-        self._motion.drive = self._kept(layout.copied(self._driven, len(model.rotations.kind)))
+        self.inputs = inputs = system.inputs
+        self._given = slice(inputs.data, inputs.data + self._given_at.shape[1])
+        self.motion.driven = stages * len(inputs.turned)
+        self.motion.drive = self._kept(layout.copied(inputs.turned, len(model.rotations.kind)))
         self._row_at = layout.lines(np.arange(system.layout.lam)).reshape(stages, -1)
         parts = [part for part in model.unwrapping.parts if part is not None]
         angles = [np.tile(np.arange(part.start, part.stop), stages) for part in parts]
@@ -143,7 +148,7 @@ class CoreStep:
 
     def _relate(self) -> None:
         """The numbers of the method."""
-        motion, given = self._motion, self._method.relations
+        motion, given = self.motion, self._method.relations
         motion.at = self._kept(self._method.places)
         for name in ("velocity", "acceleration", "after", "velocity_kept", "acceleration_kept", "after_kept"):
             setattr(motion, name, self._kept(getattr(given, name)))
@@ -151,33 +156,27 @@ class CoreStep:
 
     def _group(self, turning: Tape | None, tapes: list[Tape]) -> None:
         """Groups of terms beside those of the model: tangents, observables, rows."""
-        system, layout, motion, stages = self._system, self._layout, self._motion, self._method.stages
+        system, layout, motion, stages = self._system, self._layout, self.motion, self._method.stages
         model, count, end = system.model, len(system.masses.observables), int(layout.begins[-1]) + 1
+        self._varying = [self._own_data(number) for number in self.inputs.varying]
         self._remembering = list[tuple[Array, Index, slice]]()
         for number, group, part in system.memory.parts():
-            own = self._handed.data[number + 1] = self._handed.data[number + 1].copy()
-            self._handed.groups[number + 1].datum = own.ctypes.data
+            own = self._own_data(number + 1)
             self._remembering.append((own.reshape(stages, *group.data.shape), group.kind.memory_columns, part))
         self._told = list[tuple[Array, Index]]()
         for number, members in () if system.rubbing is None else system.rubbing.groups.items():
-            own = self._handed.data[number] = self._handed.data[number].copy()
-            self._handed.groups[number].datum = own.ctypes.data
+            own = self._own_data(number)
             self._told.append((own.reshape(stages, len(members), -1), members))
-        seen, weighed = (c.Group * count)(), (c.Observables * count)()
-        rows, turned = (c.Group * len(model.terms))(), c.Group()
-        self._arrays += [seen, weighed, rows, turned]
+        seen, weighed, groups = (c.Group * count)(), (c.Observables * count)(), (c.Group * len(model.terms))()
+        self.seen, self.observables, self.rows, turned = seen, weighed, groups, c.Group()
         if turning is not None:
             turned = layout.group(model.terms[0], turning, result=end)
-            turned.datum, end = self._handed.data[0].ctypes.data, end + turned.terms * turning.results
-            self._arrays.append(turned)
+            turned.datum, end = self.handed.data[0].ctypes.data, end + turned.terms * turning.results
+        self.turning = turned
         self._stiff = list[tuple[Tape, int]]()
-        # Data of the terms and of observables that change from step to step are written where the core reads them.
-        self._seen_data, first = list[tuple[Array, Index]](), 0
+        first = 0
         values, derivatives, others = tapes[:count], tapes[count : 2 * count], iter(tapes[2 * count :])
         for i, observed in enumerate(system.masses.observables):
-            data = np.array(layout.repeated(observed.data), dtype=float)
-            if (counted := system.angles_of(observed)) is not None:
-                self._seen_data.append((data.reshape(stages, *observed.data.shape), counted))
             seen[i] = layout.group(observed, values[i], result=end)
             end += seen[i].terms * values[i].results
             row = first + np.arange(stages * observed.mass.size)
@@ -185,27 +184,35 @@ class CoreStep:
             weighed[i].group = layout.group(observed, derivatives[i], row=row, rows=observed.mass.shape[1], result=end)
             self._stiff.append((derivatives[i], end))
             end += weighed[i].group.terms * derivatives[i].results
-            seen[i].datum = weighed[i].group.datum = data.ctypes.data
+            seen[i].datum = weighed[i].group.datum = self._kept(layout.repeated(observed.data))
+            if (counted := system.angles_of(observed)) is not None:
+                seen[i].angle = weighed[i].group.angle = len(self._angle_of)
+                self._angle_of = np.append(self._angle_of, np.tile(counted, stages))
             weighed[i].mass, weighed[i].damping = (
                 self._kept(layout.repeated(part)) for part in (observed.mass, observed.damping)
             )
             weighed[i].vectors = observed.kind.vectors
-            self._arrays.append(data)
         for number, group in enumerate(model.connections, start=1):
             if len(group.data) and group.labels.size:
-                own, tape = self._handed.groups[number], next(others)
-                rows[number] = layout.group(group, tape, loads=group.kind.sizes[4], result=end)
-                rows[number].datum, rows[number].load, rows[number].angle = own.datum, own.load, own.angle
-                end += rows[number].terms * tape.results
+                its, tape = self.handed.groups[number], next(others)
+                found = groups[number] = layout.group(group, tape, loads=group.kind.sizes[4], result=end)
+                found.datum, found.load, found.angle = its.datum, its.load, its.angle
+                groups[number], end = found, end + found.terms * tape.results
         end = self._slide(list(others), end)
-        motion.turning, motion.tangent = ctypes.addressof(turned), self._kept(layout.repeated(model.beams.tangent))
-        motion.seen, motion.rows, motion.observables = (ctypes.addressof(part) for part in (seen, rows, weighed))
+        motion.turning, motion.tangent = ctypes.addressof(turned), model.beams.flat("stiffness").shape[1]
+        motion.seen, motion.rows, motion.observables = (ctypes.addressof(part) for part in (seen, groups, weighed))
         motion.part = self._kept(np.array([0, system.linear, *(stop for _, stop in system.ranges)]))
         motion.couples = end
 
+    def _own_data(self, number: int) -> Array:
+        """Data of a group of terms that may be changed."""
+        own = self.handed.data[number] = self.handed.data[number].copy()
+        self.handed.groups[number].datum = own.ctypes.data
+        return own
+
     def _slide(self, tapes: list[Tape], end: int) -> int:
         """Groups of the places that may slide, whose results begin at ``end``; where those of others begin."""
-        rubbing, layout, motion = self._system.rubbing, self._layout, self._motion
+        rubbing, layout, motion = self._system.rubbing, self._layout, self.motion
         self._sliding = list[tuple[Sliding, Tape, int]]()
         self._slid = list[tuple[Array, Index]]()
         if rubbing is None:
@@ -227,7 +234,7 @@ class CoreStep:
 
     def _map(self) -> None:
         """Positions of what has mass or drag, their forces on places and elements, and masses and drags."""
-        system, layout, motion = self._system, self._layout, self._motion
+        system, layout, motion = self._system, self._layout, self.motion
         y = system.model.positions.Y
         by_place, by_tangent = mapped(system.by_place), mapped(system.by_tangent)
         onto_places = SparseMap(*_product(y, by_place), (y.shape[1], system.linear))
@@ -243,7 +250,7 @@ class CoreStep:
 
     def _weigh(self) -> None:
         """Weights of what moves with inner nodes of elements, and of places."""
-        system, motion = self._system, self._motion
+        system, motion = self._system, self.motion
         mass, drag = (part.nonzeros() for part in (system.place_mass, system.place_drag))
         motion.masses, motion.drags = len(mass), len(drag)
         motion.place_mass, motion.place_drag = self._kept(np.array(mass)), self._kept(np.array(drag))
@@ -272,7 +279,7 @@ class CoreStep:
 
     def _matrix(self) -> CoreSystem:
         """Of which numbers the entries of the matrix of all stages are sums, and what solves with it."""
-        system, layout, motion, stages = self._system, self._layout, self._motion, self._method.stages
+        system, layout, motion, stages = self._system, self._layout, self.motion, self._method.stages
         static, coupled = system.entry_places.static, system.entry_places.coupled
         one, both, total = system.tables.tied(static), coupled.places, layout.model.total
         parts = list[tuple[Index, Index, Array, Index]]()
@@ -302,8 +309,10 @@ class CoreStep:
         none = (np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0))
         onto, source, weight = (np.concatenate(part) for part in zip(none, *self._shares(), strict=True))
         motion.shares = layout.sums(total, onto, source, weight)
-        last = last_rows(len(rows))
-        return CoreSystem(self._library, total, keys % total, keys // total, np.zeros(total), last, False)
+        row, column, last = keys % total, keys // total, last_rows(len(rows))
+        found = CoreSystem(self._library, total, row, column, np.zeros(total), last, False)
+        self.pattern = (total, row, column, found.order)
+        return found
 
     def _by_place_and_gap(self, stage: int) -> Iterator[Index]:
         """Where derivatives of the forces of places that slide are, by their displacements, then by multipliers."""
@@ -351,7 +360,7 @@ class CoreStep:
         rotations, unilateral = (n.rotations, n.components), len(system.unilateral)
         self._taken = taken = {
             "given": np.zeros(self._given_at.size),
-            "vector": np.zeros((stages, self._turns.shape[1])),
+            "vector": np.zeros((stages, 3 * len(self.inputs.turned))),
             "q": np.zeros(rotations),
             "y": np.zeros(n.y),
             "lam": np.zeros(self._row_at.size),
@@ -385,7 +394,7 @@ class CoreStep:
         }
         self._step = c.Advance(**addresses)
         last = (ctypes.addressof(self._step), ctypes.addressof(self._point), self._memory.ctypes.data)
-        self._handed_over = (self._model.address, ctypes.addressof(self._motion), self._solver.address, *last)
+        self._handed_over = (self._model.address, ctypes.addressof(self.motion), self._solver.address, *last)
 
     def __call__(
         self, memory: Memory, h: float, ratio: float, factors: Array, turns: Array, shifts: Array
@@ -406,10 +415,9 @@ class CoreStep:
         taken = self._taken
         for data, columns, part in self._remembering:
             data[:, :, columns] = memory.remembered[part].reshape(-1, len(columns))
-        for data, counted in self._seen_data:
-            data[:, :, -1] = memory.unwrapped[counted]
-        taken["given"][self._given_at] = _summed(factors, self._given)
-        taken["vector"][...] = _summed(factors, self._turns)
+        rows = self._system.rows(factors)
+        taken["given"][self._given_at] = rows[:, self._given]
+        taken["vector"][...] = rows[:, self.inputs.parts["vectors"]]
         taken["lam"][self._row_at] = memory.lam
         begun = {"q": memory.q, "y": memory.y, "x": memory.x, "rate": memory.rates, "turn": turns, "shift": shifts}
         for name, values in begun.items():
@@ -437,10 +445,66 @@ class CoreStep:
         parts[2] = parts[2][self._row_at]
         return *parts, np.array([step.size]), np.array([step.iterations]), np.array([step.gap])
 
+    # -- flat states ----------------------------------------------------------------------------------
 
-def _summed(factors: Array, values: Array) -> Array:
-    """``factors @ values`` in one order of the sums, so that it has the same bits on every machine."""
-    return np.asarray((factors[:, :, None] * values).sum(axis=1))
+    @functools.cached_property
+    def flat(self) -> c.Flat:
+        """What the core takes of rows of inputs and flat states."""
+        stages, inputs = self._method.stages, self.inputs
+        sizes = [data.size // stages for data in self._varying]
+        addresses = (ctypes.c_void_p * len(sizes))(*(data.ctypes.data for data in self._varying))
+        self._arrays.append(addresses)
+        return c.Flat(
+            *(inputs.size, len(sizes), self._kept(np.array(sizes, np.intp)), ctypes.addressof(addresses)),
+            *(self._kept(self._given_at), self._kept(self._row_at)),
+            *(self._system.model.unwrapping.count, len(self._angle_of), self._kept(self._angle_of)),
+        )
+
+    def prefer_pivots_of(self, rows: Array, h: float, state: Array) -> None:
+        """Try the pivots of a step first in all steps of flat states: to look for them takes a third of their time."""
+        self.flat.pivots = None
+        self.after(rows, h, state)
+        self.flat.pivots = None if (found := self._solver.pivots) is None else self._kept(found)
+
+    @property
+    def groups(self) -> list[c.Group]:
+        """All groups of terms."""
+        return [*self.handed.groups, *self.rows, *self.seen, *(one.group for one in self.observables), self.turning]
+
+    @property
+    def arrays(self) -> dict[int, Any]:
+        """What the structures point to, by addresses."""
+        return self.handed.arrays | self._layout.arrays
+
+    @property
+    def results(self) -> int:
+        """How many numbers the terms give, and what couples stages."""
+        return len(self._results)
+
+    @property
+    def room(self) -> int:
+        """Numbers of memory that a step of a flat state takes."""
+        own = self._library.sf_take_step_size(*self._handed_over[:2], ctypes.addressof(self.flat))
+        return int(own + self._library.sf_work_size(self._model.address))
+
+    def after(self, rows: Array, h: float, state: Array) -> tuple[Array, float, int, float]:
+        """The flat state (numbers,) after a step of h, and of Newton's method the last change, iterations, largest gap.
+
+        A state has rotations, displacements, multipliers, what the first two gained in the stages of the last step,
+        quantities, their rates, angles that count turns, and the length of the last step, 0 for a fresh start; ``rows``
+        are those of :attr:`.System.inputs` at the stages.  It is nan where a matrix has no inverse.
+        """
+        library, solver, rows, state = self._library, self._solver, c.doubles(rows), c.doubles(state)
+        model, motion = self._handed_over[:2]
+        tables = (model, motion, ctypes.addressof(self.flat))
+        found, step, memory = np.empty(len(state)), c.Advance(), np.empty(library.sf_take_step_size(*tables))
+        numbers = (h, rows.ctypes.data, state.ctypes.data, found.ctypes.data)
+        room = (ctypes.addressof(self._point), memory.ctypes.data, ctypes.addressof(step))
+        while (broken := library.sf_take_step(*tables, solver.address, *numbers, *room)) == NO_ROOM:
+            solver.make_room()
+        if broken:
+            found[...], step.size, step.gap = np.nan, np.nan, np.nan
+        return found, step.size, step.iterations, step.gap
 
 
 def _product(y: SparseMap, by_place: SparseMap) -> tuple[Index, Index, Array]:

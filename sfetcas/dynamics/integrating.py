@@ -77,7 +77,7 @@ class Stepper:
 
     def __init__(self, system: StageEquations, method: Method) -> None:
         self.system, self.method = system, method
-        self._by_core = core_step(system, method)
+        self._by_core = core_step(system, method) if system.kernels in ("auto", "core") else None
         # Tensions are no positions: their rates, which nothing resists, may be those of rounding.
         positions, axes = np.ones(system.linear), system.axes
         positions[(axes * system.model.segments.of_tendons[:, None] + np.arange(axes)).ravel()] = 0.0

@@ -24,6 +24,7 @@ from ..mechanics import expressions
 from ..mechanics.batches import GroupBatch
 from ..mechanics.equations import Equations, State, turned_tangents
 from ..mechanics.expressions import Expressions, Given, moved_by
+from ..mechanics.inputs import Inputs
 from ..mechanics.loading import Loading
 from ..mechanics.masses import Masses, Observables
 from ..mechanics.memory import Remembering
@@ -338,6 +339,20 @@ class System(Expressions):
         """Loads and prescribed motions for factors (groups,) of their groups, dimensionless."""
         groups = [loading.scaled(float(f)) for loading, f in zip(self.loadings, factors, strict=True)]
         return functools.reduce(Loading.plus, groups)
+
+    @functools.cached_property
+    def inputs(self) -> Inputs:
+        """What is given at a stage of a step, as a row of numbers."""
+        return Inputs(self.equations)
+
+    @functools.cached_property
+    def _rows(self) -> Array:
+        return np.stack([self.inputs.of(loading) for loading in self.loadings])
+
+    def rows(self, factors: Array) -> Array:
+        """Rows of :attr:`inputs` (stages, numbers) for factors (stages, groups) of the groups of loads."""
+        # In one order of the sums, so that they have the same bits on every machine.
+        return np.asarray((factors[:, :, None] * self._rows).sum(axis=1))
 
     def loading_of(self, model: Model, t: float) -> Loading:
         """As :meth:`loading` at a dimensionless time, of a model of the same scene with another choice of them."""

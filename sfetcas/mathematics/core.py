@@ -27,6 +27,7 @@ __all__ = [
     "Cases",
     "Counting",
     "Factors",
+    "Flat",
     "Group",
     "Inputs",
     "Limits",
@@ -288,7 +289,8 @@ class Motion(ctypes.Structure):
         *((name, _int) for name in ("stages", "kept", "quantities", "linear", "groups")),
         *((name, _pointer) for name in ("part", "at", "velocity", "acceleration", "after")),
         *((name, _pointer) for name in ("velocity_kept", "acceleration_kept", "after_kept", "power", "turning")),
-        *((name, _pointer) for name in ("tangent", "seen", "rows", "observables")),
+        ("tangent", _int),
+        *((name, _pointer) for name in ("seen", "rows", "observables")),
         *((name, Map) for name in ("by_place", "by_tangent", "onto_pull", "onto_places", "mass", "drag")),
         *((name, Sums) for name in ("shares", "entries")),
         *((name, _int) for name in ("couples", "massive")),
@@ -319,6 +321,17 @@ class Advance(ctypes.Structure):
     )
 
 
+class Flat(ctypes.Structure):
+    """``sf_flat``."""
+
+    _fields_ = (
+        *((name, _int) for name in ("inputs", "groups")),
+        *((name, _pointer) for name in ("count", "datum", "given", "row")),
+        *((name, _int) for name in ("angles", "counts")),
+        *((name, _pointer) for name in ("angle", "pivots")),
+    )
+
+
 OF_WAYS = (Counting, Way, Cases, Rules, Sought, Inputs)
 
 HANDED = (TapeTable, Group, Model, Point, Factors, Pivoted, System, Limits, Border, Report, *OF_WAYS)
@@ -327,12 +340,12 @@ SIZES = (
     12,
     *(ctypes.sizeof(kind) for kind in HANDED),
     8,
-    *map(ctypes.sizeof, (Observables, Motion, Advance)),
+    *map(ctypes.sizeof, (Observables, Motion, Advance, Flat)),
     len(NAMES),
 )
 """What the core says of the sizes of what is handed to it, if it is the one that this module was written for."""
 
-VERSION = 5
+VERSION = 6
 """Number of the interface, as ``SF_VERSION``."""
 
 
@@ -429,5 +442,8 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL | None:
     library.sf_find.argtypes = [*[_pointer] * 5, _int, *[_pointer] * 4]
     library.sf_advance_size.argtypes = [_pointer] * 2
     library.sf_advance.argtypes = [_pointer] * 6
+    library.sf_pivots.argtypes = [_pointer] * 2
+    library.sf_take_step_size.argtypes = [_pointer] * 3
+    library.sf_take_step.argtypes = [*[_pointer] * 4, _double, *[_pointer] * 6]
     library.sf_solve.argtypes = [_pointer, _pointer, _int, _pointer, _pointer, _pointer]
     return library

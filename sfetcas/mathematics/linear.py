@@ -23,6 +23,7 @@ __all__ = [
     "BLURRED",
     "MISSES",
     "NO_ROOM",
+    "SOLVED",
     "CoreFactors",
     "CoreSystem",
     "InertiaSolver",
@@ -497,6 +498,8 @@ class CoreSystem:
     ----------
     address : int
         Where the core finds it.
+    order : ndarray (n,)
+        In which unknowns are eliminated with pivots.
     """
 
     def __init__(
@@ -504,9 +507,9 @@ class CoreSystem:
     ) -> None:
         self._library, self._n, self._soft = library, n, doubles(soft)
         self._factors = CoreFactors(library, n, row, column)
-        order = pivot_order(n, row, column, last)
+        self.order = order = pivot_order(n, row, column, last)
         self._whole, self._numbers = np.zeros(8 * n + 2, np.intc), np.zeros(6 * n)
-        self._order, self._room = order, 0
+        self._room = 0
         start, rows = self._factors.tables[:2]
         places, numbers = _parts_of(self._whole, n, 8), _parts_of(self._numbers, n, 2)
         # The last two have one entry more than the others.
@@ -529,6 +532,13 @@ class CoreSystem:
         pivoted.room = room
         pivoted.lower_row, pivoted.upper_row = _parts_of(whole, room, 2)
         pivoted.lower_value, pivoted.upper_value = _parts_of(numbers, room, 2)
+
+    @property
+    def pivots(self) -> Array | None:
+        """The pivots of the last factors with pivoting, see ``sf_pivots``; None where there are none."""
+        address = ctypes.addressof(self._pivoted)
+        found = np.zeros(self._library.sf_pivots(address, None), np.intc)
+        return found if self._library.sf_pivots(address, found.ctypes.data) else None
 
     def solved(self, entries: Array, b: Array) -> Array:
         """Solution for b (n,) or (n, k).

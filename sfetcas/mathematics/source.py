@@ -108,16 +108,25 @@ def table(name: str, values: Array, kind: str = "double") -> str:
     """A constant array (...) in C; an empty one has a single zero, since C has no empty arrays."""
     flat = np.asarray(values).ravel()
     texts = [_double(x) if kind == "double" else str(int(x)) for x in flat.tolist()] or ["0"]
-    lines, line = [], ""
-    for text in texts:
-        if len(line) + len(text) > 110:
-            lines.append(line)
-            line = ""
-        line += f"{text}, "
-    lines.append(line)
-    inner = "\n".join(f"  {part.rstrip()}" for part in lines).rstrip(",")
+    # There may be tens of thousands: without spaces.
+    inner = _lines(texts)
     return f"static const {kind} {name}[{len(texts)}] = {{\n{inner}\n}};\n"
 
 
+def _lines(texts: Sequence[str]) -> str:
+    """Constants with commas between them, in lines of at most 120 characters unless one is longer."""
+    lines, line = [], ""
+    for text in texts:
+        if len(line) + len(text) > 118:
+            lines.append(line)
+            line = ""
+        line += f"{text},"
+    return "\n".join([*lines, line]).rstrip(",")
+
+
 def _double(x: float) -> str:
-    return repr(x) if np.isfinite(x) else "HUGE_VAL" if x > 0.0 else "-HUGE_VAL"
+    if not np.isfinite(x):
+        return "HUGE_VAL" if x > 0.0 else "-HUGE_VAL"
+    text = repr(x)
+    # A negative zero is none where it is a whole number.
+    return text if text == "-0.0" else text.removesuffix(".0")

@@ -400,7 +400,7 @@ class Handed:
     def __init__(self, layout: CoreLayout, model: Model, noise: Array) -> None:
         self.layout, angles = layout, model.unwrapping
         numbers, sides = np.zeros((angles.count, 8)), np.zeros((angles.count, 3))
-        if angles.count and layout.copies == 1:
+        if angles.count:
             crossed = np.asarray(angles.across.any(axis=1))
             numbers[:, :3], numbers[:, 3:6], numbers[:, 6] = angles.axis, angles.across, np.where(crossed, 1.0, 2.0)
             sides = np.concatenate([angles.sides, crossed[:, None]], axis=1)

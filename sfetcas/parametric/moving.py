@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import casadi as ca
@@ -13,7 +14,9 @@ from ..dynamics.simulation import Simulation
 from ..dynamics.stages import StageEquations
 from ..equilibria.settings import Settings
 from ..errors import SceneError
+from ..mathematics.arrays import Array
 from ..mechanics.expressions import Given
+from ..mechanics.inputs import Inputs
 from ..mechanics.masses import Masses, masses_of
 from ..mechanics.unilateral import NONE, UnilateralRows
 from .arguments import Arguments
@@ -34,6 +37,22 @@ class ParametricStages(StageEquations):
     def given(self, factors: ca.MX) -> Given:
         """Data and loads for values of the arguments."""
         return self._arguments.program.given_by(self._arguments.given(factors))
+
+    @property
+    def inputs(self) -> Inputs:
+        """What is given at a stage of a step, with the data that vary."""
+        return self._arguments.program.inputs
+
+    @functools.cached_property
+    def row(self) -> ca.Function:
+        """(arguments) -> the row of :attr:`inputs`."""
+        program, p = self._arguments.program, ca.MX.sym("arguments", self.layout.factors)
+        row = program.row(self._arguments.given(p))
+        return ca.Function(f"{program.prefix}inputs", [p], [row], ["arguments"], ["row"])
+
+    def rows(self, factors: Array) -> Array:
+        """Rows of :attr:`inputs` (stages, numbers) for values (stages, numbers) of the arguments."""
+        return np.stack([np.array(self.row(one)).ravel() for one in factors])
 
 
 def motion_of(scene: Scene, settings: Settings, *, one_sided: bool = False) -> Simulation:

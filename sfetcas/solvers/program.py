@@ -45,6 +45,7 @@ class Program:
 
     Attributes
     ----------
+    prefix : str
     states : int
         Length of a state.
     sizes : mapping of str to int
@@ -58,7 +59,7 @@ class Program:
     def __init__(
         self, expressions: Expressions, varying: Mapping[str, bool] | None = None, *, prefix: str = ""
     ) -> None:
-        self._prefix = prefix
+        self.prefix = prefix
         self.expressions, self.model = expressions, expressions.model
         self.equations = expressions.equations
         n = expressions.layout
@@ -196,7 +197,7 @@ class Program:
 
     def _function(self, name: str, arguments: Mapping[str, ca.MX], results: Mapping[str, ca.MX]) -> ca.Function:
         return ca.Function(
-            self._prefix + name, list(arguments.values()), list(results.values()), list(arguments), list(results)
+            self.prefix + name, list(arguments.values()), list(results.values()), list(arguments), list(results)
         )
 
     # -- counted turns ------------------------------------------------------------------------------
@@ -325,12 +326,17 @@ class Program:
         return [i for i, own in enumerate(names) if any(name in self.sizes for name in own)]
 
     @functools.cached_property
+    def inputs(self) -> Inputs:
+        """What an equilibrium depends on, with the data that vary."""
+        return Inputs(self.equations, self.varying)
+
+    @functools.cached_property
     def row(self) -> ca.Function:
-        """(given) -> the row of :class:`~sfetcas.mechanics.inputs.Inputs` with the data that vary."""
-        inputs, angles = Inputs(self.equations, self.varying), ca.MX(0, 1)
+        """(given) -> the row of :attr:`inputs`."""
+        angles = ca.MX(0, 1)
         if self.expressions.layout.unwrapped:
             angles = self._prescribed_unwrapped(self._prescribed())
-        row = inputs.expression(self.expressions, self.given, angles)
+        row = self.inputs.expression(self.expressions, self.given, angles)
         return self._function("row", {"given": self.symbol}, {"row": row})
 
 

@@ -22,19 +22,6 @@ static void sf_none(double *x, int n) {
   for (i = 0; i < n; ++i) x[i] = NAN;
 }
 
-/* The next so many numbers of the memory. */
-static double *sf_numbers(double **next, size_t count) {
-  double *found = *next;
-  *next += count;
-  return found;
-}
-
-static int *sf_wholes(int **next, size_t count) {
-  int *found = *next;
-  *next += count;
-  return found;
-}
-
 int @name@_solve(@name@_memory *m, const double *arguments, double *state, int warm, double *results,
                  @name@_report *report) {
   sf_model model = sf_the_model;
@@ -58,14 +45,9 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
   inputs.datum = data;
   row = sf_numbers(&numbers, SF_INPUTS);
   own = sf_numbers(&numbers, SF_STATE);
-  point.result = sf_numbers(&numbers, (size_t)model.results);
-  point.place = sf_numbers(&numbers, (size_t)(model.places * model.axes));
-  point.pull = sf_numbers(&numbers, (size_t)(model.elements * model.points * model.axes));
-  point.work = sf_numbers(&numbers, (size_t)sf_work_size(&model));
-  factors.n = pivoted.n = SF_TOTAL;
+  sf_lend_point(&model, model.results, &point, &numbers);
+  sf_lend(&factors, &pivoted, &numbers, &whole);
   factors.entries = model.entry_count;
-  factors.start = pivoted.start = sf_start_of_columns;
-  factors.row = pivoted.row = sf_rows;
   factors.order = sf_order;
   factors.place = sf_place_in_order;
   factors.value = sf_numbers(&numbers, SF_FILLED);
@@ -80,24 +62,6 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
   sf_count(&factors);
   system.factors = &factors;
   system.pivoted = &pivoted;
-#if SF_ROOM
-  pivoted.order = sf_order_with_pivots;
-  pivoted.room = SF_ROOM;
-  pivoted.lower_value = sf_numbers(&numbers, SF_ROOM);
-  pivoted.upper_value = sf_numbers(&numbers, SF_ROOM);
-  pivoted.pivot = sf_numbers(&numbers, SF_TOTAL);
-  pivoted.x = sf_numbers(&numbers, SF_TOTAL);
-  pivoted.lower_row = sf_wholes(&whole, SF_ROOM);
-  pivoted.upper_row = sf_wholes(&whole, SF_ROOM);
-  pivoted.place = sf_wholes(&whole, SF_TOTAL);
-  pivoted.row_of = sf_wholes(&whole, SF_TOTAL);
-  pivoted.mark = sf_wholes(&whole, SF_TOTAL);
-  pivoted.reached = sf_wholes(&whole, SF_TOTAL);
-  pivoted.stack = sf_wholes(&whole, SF_TOTAL);
-  pivoted.at = sf_wholes(&whole, SF_TOTAL);
-  pivoted.lower = sf_wholes(&whole, SF_TOTAL + 1);
-  pivoted.upper = sf_wholes(&whole, SF_TOTAL + 1);
-#endif
   sought.iterations = 0;
   sought.negative = SF_NOT_DEFINED;
   sought.residual = HUGE_VAL;

@@ -1,11 +1,4 @@
 
-static int sf_all_finite(const double *x, int n) {
-  int i;
-  for (i = 0; i < n; ++i)
-    if (x[i] - x[i] != 0.0) return 0;
-  return 1;
-}
-
 static int sf_accepted(const double *p) {
   int i;
   for (i = 0; i < @NAME@_ARGUMENTS * @NAME@_TIMES; ++i)
@@ -13,16 +6,11 @@ static int sf_accepted(const double *p) {
   return 1;
 }
 
-static void sf_copy(double *to, const double *from, int n) {
-  int i;
-  for (i = 0; i < n; ++i) to[i] = from[i];
-}
-
 void @name@_begin(double *state) { sf_copy(state, sf_begin, @NAME@_STATE); }
 
 void @name@_refresh(double *state) { state[@NAME@_STATE - 1] = 0.0; }
 
-void @name@_times(double *shares) { sf_copy(shares, sf_times, @NAME@_TIMES); }
+void @name@_times(double *shares) { sf_copy(shares, sf_loaded, @NAME@_TIMES); }
 
 void @name@_tell(@name@_memory *m, const double *arguments, const double *state, double *results) {
   m->arg[0] = state;
@@ -41,15 +29,7 @@ int @name@_step_through(@name@_memory *m, double h, const double *arguments, dou
     m->iterations = 0.0;
     m->gap = NAN;
   } else {
-    m->arg[0] = state;
-    m->arg[1] = &h;
-    m->arg[2] = arguments;
-    m->res[0] = m->after;
-    m->res[1] = &m->size;
-    m->res[2] = &m->iterations;
-    m->res[3] = &m->gap;
-    if (@name@_advance(m->arg, m->res, m->iw, m->w, 0) || !(m->size <= SF_CONVERGED) ||
-        !sf_all_finite(m->after, @NAME@_STATE))
+    if (sf_advanced(m, h, arguments, state) || !(m->size <= SF_CONVERGED) || !sf_all_finite(m->after, @NAME@_STATE))
       status = @NAME@_NOT_CONVERGED;
   }
   if (results && status == @NAME@_DONE) {

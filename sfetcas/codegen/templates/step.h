@@ -34,7 +34,7 @@ typedef struct {
   double *res[@sz_res@];
   int iw[@sz_iw@];
   double w[@sz_w@];
-  double after[@sz_state@], arguments[@sz_p@], size, iterations, gap;
+  double after[@sz_state@], arguments[@sz_p@], size, iterations, gap;@core_declared@
 } @name@_memory;
 
 typedef struct {
