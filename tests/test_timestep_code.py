@@ -11,10 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scenes
+from systems import EVERYTHING
 from test_codegen import built, needs_compiler, said
 
 from sfetcas import Scene, SceneError, export, load, solve
 from sfetcas.codegen.timestep import time_step
+from sfetcas.dynamics.steps import LAST_CHANGE
+from sfetcas.mathematics import core as c
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 MOVING = ["cantilever_force_pulse", "slider_crank_motion", "pendulum_flexible_smooth", "pendulums_rigid"]
@@ -65,6 +69,120 @@ def test_steps_are_those_of_the_simulation(integrator):
     assert found["nodes.B.position"] == pytest.approx(last.position("B"), abs=1e-9)
     # Velocities of answers come of polynomials through several steps: those of a step are of its order only.
     assert found["nodes.B.velocity"] == pytest.approx(last.velocity("B"), abs=0.1)
+
+
+needs_core = pytest.mark.skipif(c.core() is None, reason="no core here, and no compiler that makes one")
+
+
+def motion_of(table, **analysis):
+    return scenes.made({**table, "analysis": {"type": "dynamic", "end": 1.0, **analysis}})
+
+
+def driven(name, **analysis):
+    """A scene with every kind of term, whose motions begin at rest, and arguments that change its data."""
+    table = EVERYTHING[name]()
+    motions = {key: {**motion, "history": "on"} for key, motion in table.get("motions", {}).items()}
+    more = {"motions": motions, "histories": {"on": {"t": [0, 1], "polynomial": [[0, 0, 1]]}}} if motions else {}
+    scene = motion_of({**table, **more}, **analysis)
+    given = [f"sections.{key}.EI3" for key, one in scene.sections.items() if isinstance(one.EI3, float)]
+    given += [f"springs.{key}.stiffness" for key, one in scene.springs.items() if isinstance(one.stiffness, float)]
+    given += ["factor"] if scene.loads or scene.motions else []
+    return scene, [*given, *(f"loads.{key}.value" for key in scene.loads if not key.startswith("idle"))]
+
+
+def parts_of(made, state):
+    bounds = np.cumsum([0, *made.sizes.values()]).tolist()
+    return {name: state[i:j] for name, i, j in zip(made.sizes, bounds, bounds[1:], strict=False)}
+
+
+@needs_core
+@pytest.mark.parametrize("integrator", ["radau-3", "radau-2", "generalised-alpha"])
+@pytest.mark.parametrize("name", EVERYTHING)
+def test_steps_by_the_core_are_those_of_the_functions(name, integrator):
+    """From rest, then from there, then afresh, with arguments that differ from stage to stage."""
+    scene, given = driven(name, integrator=integrator)
+    made = time_step(scene, "motion", arguments=given)
+    assert made.by_core is not None
+    state = made.begin
+    for number, h in enumerate((0.005, 0.006, 0.006)):
+        p = (1.0 + 0.1 * number + 0.05 * made.times)[:, None] * made.arguments.defaults
+        mine, size, iterations, gap = made.by_core.after(made.system.rows(p), h / made.time, state)
+        other, last, count, missed = (np.array(part).ravel() for part in made.advance(state, h, p.T))
+        assert iterations == count[0]
+        assert abs(size - last[0]) <= 1e-6 * last[0] + 1e-12
+        assert abs(gap - missed[0]) <= 1e-12
+        assert size <= LAST_CHANGE
+        one, two = parts_of(made, mine), parts_of(made, other)
+        for part, values in one.items():
+            # Rounding of a step, which rates and forces have over powers of its length: see test_core_steps.
+            divided = {"rates": made.method.kept, "lam": 2}.get(part, 0)
+            bound = 1e-10 * np.abs(two[part]).max(initial=1.0) + 5e-13 * (h / made.time) ** -divided
+            assert np.abs(values - two[part]).max(initial=0.0) <= bound, part
+        # The third step knows nothing of the second.
+        state = np.append(mine[:-1], 0.0) if number else mine
+    moved = parts_of(made, state)["q"] - parts_of(made, made.begin)["q"]
+    assert np.abs(moved).max() > 1e-5
+
+
+@needs_core
+def test_pivots_of_another_matrix_change_rounding_alone():
+    scene, given = driven("linked")
+    made = time_step(scene, "motion", arguments=given)
+    known, rows = made.by_core, made.system.rows(np.tile(2.0 * made.arguments.defaults, (3, 1)))
+    assert known.flat.pivots
+    found, state = [], made.begin
+    for pivots in (known.flat.pivots, None, known.flat.pivots):
+        known.flat.pivots = pivots
+        found.append([known.after(rows, h / made.time, state)[0] for h in (0.008, 0.01)])
+    # A step hangs on its state alone, not on which was taken before.
+    assert all(np.array_equal(*pair) for pair in zip(found[0], found[2], strict=True))
+    for mine, other in zip(*found[:2], strict=True):
+        # Forces are accelerations, which have the rounding of places over the square of the step.
+        assert mine == pytest.approx(other, rel=1e-9, abs=1e-9)
+        assert not np.array_equal(mine, other)
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["linked_space", "guided", "following_space", "sliding_plane"])
+def test_data_that_vary_in_c(name, tmp_path):
+    scene, given = driven(name, step=0.001)
+    made = export(scene, tmp_path / "c", name="motion", arguments=given)
+    assert made.by_core is None or made.system.inputs.varying
+    assert "10 of 10 steps agree, 10 of them to the last bit" in said(built(tmp_path / "c", "motion"))
+
+
+@needs_compiler
+def test_angles_go_on_beyond_a_turn_in_c(tmp_path):
+    """A bar that is driven round against a spring and a damper: both count its turns."""
+    table = {
+        "sections": {"bar": {"rhoA": 2.0, "rhoI": [0.1, 0.1, 0.1]}},
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [0.5, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "type": "rigid", "section": "bar"}},
+        "springs": {"s": {"node": "A", "stiffness": 0.2, "damping": 0.1}},
+        "loads": {"d": {"type": "moment", "node": "A", "value": 3.0}},
+    }
+    scene = motion_of({**table, "dimension": "space"}, end=4.0, step=0.1)
+    made = export(scene, tmp_path / "c", name="motion", arguments=["springs.s.stiffness", "loads.d.value"])
+    assert "10 of 10 steps agree, 10 of them to the last bit" in said(built(tmp_path / "c", "motion"))
+    state = made.begin
+    for _ in range(40):
+        state = made.step(state, 0.1)
+    plane = time_step(motion_of(table, end=4.0, step=0.1), "motion")
+    flat = plane.begin
+    for _ in range(40):
+        flat = plane.step(flat, 0.1)
+    turned = parts_of(plane, flat)["q"][0]
+    assert abs(turned) > 2.0 * np.pi
+    assert np.abs(parts_of(made, state)["near"]) == pytest.approx(abs(turned), rel=1e-6)
+
+
+@needs_compiler
+def test_steps_without_the_core_are_those_of_the_functions(tmp_path, monkeypatch):
+    monkeypatch.setenv("SFETCAS_CORE", "off")
+    made = export(rod(step=0.01), tmp_path / "c", name="motion")
+    assert made.by_core is None
+    assert "motion_advance(" in (tmp_path / "c" / "motion.c").read_text()
+    assert "10 of 10 steps agree, 10 of them to the last bit" in said(built(tmp_path / "c", "motion"))
 
 
 def splits(made):

@@ -123,7 +123,7 @@ class StepWriter(Writer):
         """
         constants: dict[str, float] = {"CONVERGED": LAST_CHANGE}
         if self._tables is not None:
-            constants |= self._tables.constants | {"SOLVED_TO": SOLVED, "TIME": self.step.time}
+            constants |= self._tables.constants | {"SOLVED_TO": SOLVED, "TIME": float(self.step.time)}
         of_core = [] if self._tables is None else [*core_in_c("motion.c"), *self._tables.texts]
         return [
             *of_core,
