@@ -469,15 +469,15 @@ def test_pivots_serve_the_next_matrices(library, seed):
     system.solved(matrix[row, column], b)
     chosen = list(rows)
     # A pivot that is no more the largest of its column, nor a tenth of that.
-    k = next(k for k in range(n) if chosen[k] != system._order[k] and matrix[chosen[k], system._order[k]] != 0.0)
+    k = next(k for k in range(n) if chosen[k] != system.order[k] and matrix[chosen[k], system.order[k]] != 0.0)
     smaller = matrix.copy()
-    smaller[chosen[k], system._order[k]] *= 0.05
+    smaller[chosen[k], system.order[k]] *= 0.05
     assert solved_again(smaller) == chosen
     system.solved(smaller[row, column], b)
     assert list(rows) != chosen
     system.solved(matrix[row, column], b)
     none = matrix.copy()
-    none[chosen[0], system._order[0]] = 0.0
+    none[chosen[0], system.order[0]] = 0.0
     assert solved_again(none) != chosen
 
 

@@ -104,8 +104,8 @@ def test_steps_by_the_core_are_those_of_the_functions(name, integrator):
     made = time_step(scene, "motion", arguments=given)
     assert made.by_core is not None
     state = made.begin
-    for number, h in enumerate((0.005, 0.006, 0.006)):
-        p = (1.0 + 0.1 * number + 0.05 * made.times)[:, None] * made.arguments.defaults
+    for number, h in enumerate((0.01, 0.0125, 0.0125)):
+        p = (0.5 + 0.1 * number + 0.05 * made.times)[:, None] * made.arguments.defaults
         mine, size, iterations, gap = made.by_core.after(made.system.rows(p), h / made.time, state)
         other, last, count, missed = (np.array(part).ravel() for part in made.advance(state, h, p.T))
         assert iterations == count[0]
