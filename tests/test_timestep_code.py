@@ -151,6 +151,38 @@ def test_data_that_vary_in_c(name, tmp_path):
     assert "10 of 10 steps agree, 10 of them to the last bit" in said(built(tmp_path / "c", "motion"))
 
 
+GAP = """
+#include <stdio.h>
+#include "motion.h"
+static double p[MOTION_ARGUMENTS], state[MOTION_STATE];
+static motion_memory memory;
+int main(void) {
+  motion_report report;
+  motion_defaults(p);
+  p[0] += 0.1;
+  motion_begin(state);
+  motion_step(&memory, 0.02, p, state, 0, &report);
+  printf("%d %.17g", report.iterations, report.gap);
+  return report.status;
+}
+"""
+
+
+@needs_core
+@needs_compiler
+def test_gaps_of_guides_that_turn_are_told_in_c(tmp_path):
+    scene, _ = driven("sliding_plane")
+    made = export(scene, tmp_path / "c", name="motion", arguments=["nodes.B.direction", "factor"])
+    (tmp_path / "c" / "gap.c").write_text(GAP)
+    command = ["gcc", "-std=c99", "-O0", "-ffp-contract=off", "-o", "gap", "gap.c", "motion.c", "-lm"]
+    subprocess.run(command, cwd=tmp_path / "c", check=True)
+    iterations, gap = said(tmp_path / "c" / "gap").split()
+    rows = made.system.rows(np.tile(made.arguments.defaults + [0.1, *[0.0] * (made.arguments.size - 1)], (3, 1)))
+    _, size, count, missed = made.by_core.after(rows, 0.02 / made.time, made.begin)
+    assert size <= LAST_CHANGE
+    assert (int(iterations), float(gap)) == (count, missed)
+
+
 @needs_compiler
 def test_angles_go_on_beyond_a_turn_in_c(tmp_path):
     """A bar that is driven round against a spring and a damper: both count its turns."""
