@@ -177,7 +177,9 @@ def test_gaps_of_guides_that_turn_are_told_in_c(tmp_path):
     command = ["gcc", "-std=c99", "-O0", "-ffp-contract=off", "-o", "gap", "gap.c", "motion.c", "-lm"]
     subprocess.run(command, cwd=tmp_path / "c", check=True)
     iterations, gap = said(tmp_path / "c" / "gap").split()
-    rows = made.system.rows(np.tile(made.arguments.defaults + [0.1, *[0.0] * (made.arguments.size - 1)], (3, 1)))
+    turned = made.arguments.defaults.copy()
+    turned[0] += 0.1
+    rows = made.system.rows(np.tile(turned, (3, 1)))
     _, size, count, missed = made.by_core.after(rows, 0.02 / made.time, made.begin)
     assert size <= LAST_CHANGE
     assert (int(iterations), float(gap)) == (count, missed)

@@ -9,6 +9,7 @@ from ..mathematics.arrays import Array
 from .equations import Equations, State
 from .fields import Fields
 from .loading import Loading
+from .model import Model
 
 __all__ = ["STEP", "Displacements"]
 
@@ -38,6 +39,21 @@ class Displacements:
         )
         self._scale = size / (2.0 * STEP)
 
+    @property
+    def model(self) -> Model:
+        """That of the state."""
+        return self._equations.model
+
+    @property
+    def spins(self) -> Array:
+        """Rotation vectors (rotations, components) of all rotations, rad."""
+        return self._equations.spins(self._change)
+
+    @property
+    def turned(self) -> Array:
+        """Changes of the tangents (elements, points, axes) times weights and lengths, dimensionless."""
+        return np.asarray(self._scale * (self._ahead.turned - self._behind.turned))
+
     def position(self, node: str) -> Array:
         """Displacement of a node, (3,) m."""
         return np.asarray(self._scale * (self._ahead.position(node) - self._behind.position(node)))
@@ -47,7 +63,7 @@ class Displacements:
         turn = self._equations.model.rotations.node_turn[node]
         if turn is None:
             return None
-        vector = self._equations.spins(self._change)[turn]
+        vector = self.spins[turn]
         return np.concatenate([np.zeros(3 - len(vector)), vector])
 
     def along(self, member: str, at: Array) -> dict[str, Array]:
