@@ -5,7 +5,7 @@ import pytest
 from scenes import CARRIED, CROSSING
 
 from sfetcas import Scene, SceneError, SolveError, Status, solve
-from sfetcas.dynamics.modes import _displacements
+from sfetcas.mechanics.displacements import Displacements
 
 FLOOR = {"type": "plane", "point": [0, -0.3], "normal": [0, 1]}
 DRUM = {"type": "circle", "center": [0.6, -0.5], "radius": 0.3}
@@ -42,7 +42,9 @@ def compliance(modes, node):
     np.add.at(matrix, (motion.stiffness.row, motion.stiffness.column), motion.stiffness.value)
     np.add.at(matrix, (n + motion.constraints.row, motion.constraints.column), motion.constraints.value)
     matrix[:n, n:] = matrix[n:, :n].T
-    moved = np.array([_displacements(motion, shape).position(node) for shape in np.eye(n)])
+    moved = np.array(
+        [Displacements(motion.equations, motion.state, motion.loading, shape).position(node) for shape in np.eye(n)]
+    )
     scales = motion.model.scales
     right = np.vstack([moved / scales.length / scales.force, np.zeros((rows, 3))])
     return moved.T @ np.linalg.lstsq(matrix, right, rcond=1e-14)[0][:n]

@@ -1,13 +1,16 @@
 """Frequencies and shapes: against each other, moved and turned, by a full route, and by what shapes have to be."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sfetcas import Analysis, Arc, CrossSection, Load, Member, Node, Scene, SceneError, Spring, solve
+from sfetcas import Analysis, Arc, CrossSection, Load, Member, Node, Scene, SceneError, Spring, load, solve
 from sfetcas.cli import main
 from sfetcas.description.scenefile import dump
+
+PROBLEMS = Path(__file__).parent.parent / "problems"
 
 STRIP = CrossSection(EI2=1.0, EI3=1.0, GJ=0.8, rhoA=1.0, rhoI=[0.02, 0.01, 0.015])
 
@@ -249,3 +252,48 @@ def test_json_answer(tmp_path, capsys):
 def test_gauss_points_carry_no_masses():
     with pytest.raises(SceneError, match="accepted: 'nodes' with modes"):
         solve(cantilever(), gauss=True)
+
+
+EXACT = 1e-10
+"""Accuracy of the frequencies that others are compared with."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "clamped_free",
+        "pinned_pinned",
+        "bent_cantilever_1",
+        "helix",
+        "tip_mass",
+        "stepped",
+        "over_prop",
+        "turning_4",
+        "quarter_ring_loaded",
+        "hanging_chain",
+        "ring_in_plane",
+    ],
+)
+def test_estimated_errors_are_those_of_the_frequencies(name):
+    """Frequencies are within the estimate, which is not much too large."""
+    scene = load(PROBLEMS / f"vibration_{name}.toml")
+    exact = solve(scene, accuracy=EXACT).omega
+    sharp = list[float]()
+    for given in [{"accuracy": 10.0**-k} for k in (4, 5, 6, 7)]:
+        found = solve(scene, **given)
+        assert found.error_estimate <= given["accuracy"]
+        error = float(np.abs(found.omega / exact - 1.0).max())
+        # Of a smaller one rounding, of both, is a part.
+        if error > 3.0 * EXACT:
+            assert error <= found.error_estimate
+            sharp.append(found.error_estimate / error)
+    assert not sharp or np.median(sharp) < 60.0
+
+
+def test_estimated_error_is_no_less_than_rounding():
+    """A wing that is 100,000 times stiffer one way than the other: its frequencies lose a digit with each halving."""
+    scene = load(PROBLEMS / "vibration_wing_mass_aside.toml")
+    wanted = next(one.value for one in scene.expect if one.quantity == "modes.omega")
+    found = solve(scene, accuracy=1e-6)
+    error = np.abs(found.omega[: len(wanted)] / np.array(wanted) - 1.0).max()
+    assert 0.0 < error <= found.error_estimate <= 1e-6

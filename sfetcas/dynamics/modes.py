@@ -34,7 +34,7 @@ from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import TINY, Array, first_of_largest
 from ..mathematics.linear import SparseSolver, smallest
 from ..mathematics.threads import single_threaded
-from ..mechanics.accuracy import remaining, roughness, roughness_of_change
+from ..mechanics.accuracy import remaining_by_order, roughness, roughness_of_change
 from ..mechanics.displacements import STEP, Displacements
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import transferred
@@ -83,9 +83,10 @@ halved.
 BLURRED = 2e-11
 """Relative error of a frequency that rounding leaves: 5e-12 to 2e-11 on meshes of 8 to 32 elements (measured)."""
 
-EXPLAINED = 4.0
-"""Relative error of a frequency over the square of the roughness of its shape, at most: 0.03 to 0.6 are usual, 2.3 was
-the largest but where symmetry makes the highest coefficients of all elements vanish.
+ROUGH, EXPLAINED = 2.0, 4.0
+"""Relative error of a frequency over the square of the roughness of its shape: such an estimate, and the most that it
+explains.  0.03 to 0.6 are usual (measured, 90 of 100), 2.3 was the largest but where symmetry makes the highest
+coefficients of elements vanish.
 """
 
 YIELDS = 1e5
@@ -505,10 +506,10 @@ def _remaining(coarse: Eigenmotions, fine: Eigenmotions, before: Array, after: A
     if not len(after) or len(after) != len(before) or coarse.rigid != fine.rigid:
         return _difference(coarse, fine)
     differences = np.abs(coarse.exponents - fine.exponents) / np.maximum(np.abs(fine.exponents), TINY)
-    # Frequencies are of order 2 p, roughness of order p.  What meshes differ by may be small by chance: no less than
-    # the square of the roughness is left, and what rounding leaves in eigenvalues.
-    gained = np.clip(np.divide(after, before, out=np.ones(len(after)), where=before > 0.0), 0.5**order, 1.0) ** 2
-    left = np.minimum(np.maximum(remaining(differences, gained), np.maximum(after**2, BLURRED)), differences)
+    # What the order of frequencies, 2 p, leaves may be too little on coarse meshes, roughness where symmetry makes it
+    # vanish: the larger one counts.
+    left = np.maximum(np.maximum(ROUGH * after**2, remaining_by_order(differences, 2 * order)), BLURRED)
+    left = np.minimum(left, differences)
     # What roughness does not explain is rounding beside stiffnesses that differ by much, which grows with the mesh.
     return float(np.maximum(left, 2.0 * (differences - EXPLAINED * before**2)).max())
 

@@ -99,6 +99,11 @@ def remaining(difference: Any, gain: Any) -> Any:
     return found if np.ndim(found) else float(found)
 
 
+def remaining_by_order(difference: Any, order: int) -> Any:
+    """What the order of a quantity says of its error after all elements were halved, with a margin."""
+    return SAFETY * 0.5**order * difference
+
+
 def roughness(fields: Fields) -> Array:
     """A measure of how rough the solution is in each element, (elements,): sizes of its highest Legendre coefficients.
 
