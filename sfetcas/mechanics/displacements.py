@@ -68,10 +68,9 @@ class Displacements:
 
     def along(self, member: str, at: Array) -> dict[str, Array]:
         """Displacements ``position`` (n, 3) m and ``rotation`` (n, 3) rad at fractions (n,) of a member's length."""
-        one, other = self._ahead.along(member, at), self._behind.along(member, at)
-        if self._equations.model.space:
-            between = quaternion.multiply(one["rotation"], quaternion.conjugate(other["rotation"]))
-            turn = quaternion.rotation_vector(between)
+        (place, one), (beside, other) = (side.placed(member, at) for side in (self._ahead, self._behind))
+        if self.model.space:
+            turn = quaternion.rotation_vector(quaternion.multiply(one, quaternion.conjugate(other)))
         else:
-            turn = np.pad(one["rotation"] - other["rotation"], ((0, 0), (2, 0)))
-        return {"position": self._scale * (one["position"] - other["position"]), "rotation": self._scale * turn}
+            turn = np.pad(one - other, ((0, 0), (2, 0)))
+        return {"position": self._scale * (place - beside), "rotation": self._scale * turn}

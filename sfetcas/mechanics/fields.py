@@ -532,6 +532,13 @@ class Fields:
             found.append(batch(self.q, self._nodal, self.state.unwrapped, loads[number])[0][own])
         return np.concatenate(found)
 
+    def placed(self, member: str, x: Array) -> tuple[Array, Array]:
+        """``position`` and ``rotation`` of :meth:`along` without the rest."""
+        if self.model.scene.members[member].type == "small":
+            found = self._along_body(member, x)
+            return found["position"], found["rotation"]
+        return self.positions(member, x), rotations_along(self.model, self.state.q, member, x)
+
     def _along(self, member: str, x: Array) -> dict[str, Array]:
         """Position (m), rotation, force and moment, dimensionless."""
         return self._shared(member, x)[0]
