@@ -1,8 +1,9 @@
 """The knob measured: what ``accuracy`` promises against what comes out; part of ``python -m benchmarks``.
 
-All problems of statics in the folder ``problems`` of the working folder are solved to several accuracies.  True errors
-are against the same equilibria on a quarter of the element lengths, in contact against the finest answer;
-effectivity is estimated over true error.  For 1e-6 the time is compared with that of the best mesh of equal elements.
+All problems of statics, modes and paths in the folder ``problems`` of the working folder are solved to several
+accuracies.  True errors are against the same equilibria on a quarter of the element lengths, in contact, of modes and
+of paths against the finest answer; effectivity is estimated over true error.  For 1e-6 in statics the time is compared
+with that of the best mesh of equal elements.
 """
 
 from __future__ import annotations
@@ -20,10 +21,14 @@ from sfetcas.tradeoff.variants import Variant, families
 
 from .saving import head, row
 
-__all__ = ["knob", "static_problems"]
+__all__ = ["knob", "problems_of", "static_problems"]
 
-ASKED = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-"""Accuracies."""
+ASKED = {
+    "static": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
+    "modes": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
+    "path": (1e-3, 1e-4, 1e-5, 1e-6),
+}
+"""Accuracies, by the type of the analysis."""
 
 COMPARED = 1e-6
 """That at which times are compared with the best mesh."""
@@ -34,14 +39,21 @@ RIVALS = ("SFET3", "SFET5", "SFET7", "SFET9")
 RUNS, LONGEST = 2, 1.0
 """Of each, and seconds that all may take."""
 
-FINEST = 1e-11
+FINEST = {"static": 1e-11, "modes": 1e-11, "path": 1e-8}
+"""Accuracies of what others are compared with."""
 
-EXACT = 1e-13
-"""Errors below this are rounding, of which no estimate can be told right or wrong."""
+EXACT = {"static": 1e-13, "modes": 1e-10, "path": 3e-9}
+"""Errors below this are rounding, or of what others are compared with: no estimate can be told right or wrong by them.
+"""
 
 
 def static_problems() -> dict[str, Scene]:
-    """Scenes of statics in the folder ``problems``, by their names.
+    """Scenes of statics in the folder ``problems``, by their names; raises as :func:`problems_of`."""
+    return problems_of("static")
+
+
+def problems_of(kind: str) -> dict[str, Scene]:
+    """Scenes with a type of analysis in the folder ``problems``, by their names.
 
     Raises
     ------
@@ -52,34 +64,47 @@ def static_problems() -> dict[str, Scene]:
     if not files:
         raise SceneError("problems: found no scenes here, accepted: a working folder that has the folder problems")
     scenes = {file.stem: load(file) for file in files}
-    return {name: scene for name, scene in scenes.items() if scene.analysis.type == "static"}
+    return {name: scene for name, scene in scenes.items() if scene.analysis.type == kind}
 
 
 def knob() -> None:
     """Effectivity, share of answers that keep what was asked for, and time against the best mesh by hand."""
-    print("Accuracy asked for and kept, over all problems of statics; effectivity: estimated over true error\n")
-    scenes = static_problems()
+    scenes, references = _kept("static")
+    _against_the_best(scenes, references)
+    for kind in ("modes", "path"):
+        print()
+        _kept(kind)
+
+
+NAMES = {"static": "statics", "modes": "modes", "path": "paths"}
+
+
+def _kept(kind: str) -> tuple[dict[str, Scene], dict[str, Measurement]]:
+    """Print how the accuracy is kept; the problems, and what they were compared with."""
+    print(f"Accuracy asked for and kept, over all problems of {NAMES[kind]}; effectivity: estimated over true error\n")
+    scenes, accuracies = problems_of(kind), ASKED[kind]
     found = {
-        name: {asked: measure(scene, Variant(accuracy=asked), 0) for asked in ASKED} for name, scene in scenes.items()
+        name: {asked: measure(scene, Variant(accuracy=asked), 0) for asked in accuracies}
+        for name, scene in scenes.items()
     }
-    references = {name: measure(scene, Variant(accuracy=FINEST), 0) for name, scene in scenes.items()}
+    references = {name: measure(scene, Variant(accuracy=FINEST[kind]), 0) for name, scene in scenes.items()}
     rows: list[tuple[str, ...]] = []
-    for asked in ASKED:
+    for asked in accuracies:
         errors = {name: _error(runs[asked], references[name]) for name, runs in found.items()}
         effects = [
             float(run.estimate) / errors[name]
             for name, run in ((name, runs[asked]) for name, runs in found.items())
-            if run.estimate and EXACT < errors[name] < np.inf
+            if run.estimate and EXACT[kind] < errors[name] < np.inf
         ]
         kept = sum(error <= asked for error in errors.values())
         worst = max(errors, key=lambda name: errors[name])
-        low, middle, high = np.quantile(effects, [0.05, 0.5, 0.95])
+        low, middle, high = np.quantile(effects, [0.05, 0.5, 0.95]) if effects else 3 * [np.nan]
         rows.append(
             (
                 f"{asked:.0e}",
                 f"{kept} of {len(errors)}",
                 f"{errors[worst] / asked:.2g} ({worst})",
-                f"{min(effects):.2g}",
+                f"{min(effects, default=np.nan):.2g}",
                 f"{low:.2g}",
                 f"{middle:.2g}",
                 f"{high:.2g}",
@@ -87,7 +112,7 @@ def knob() -> None:
         )
     heads = ("accuracy", "kept", "largest error over it", "effectivity, least", "5 %", "median", "95 %")
     print("\n".join(markdown_table(heads, rows)))
-    _against_the_best(scenes, references)
+    return scenes, references
 
 
 def _error(run: Measurement, reference: Measurement) -> float:
