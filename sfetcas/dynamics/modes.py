@@ -3,7 +3,7 @@
 1. The equilibrium of the loads is found by statics; a scene without loads is undeformed, supported or not.
 2. It is transferred to a mesh on which every end of an element has a displacement, as masses need it, and corrected
    there by Newton's method.
-3. All elements are halved until the relative changes of the frequencies are less than the accuracy.
+3. All elements are halved until the estimated error of the frequencies is less than the accuracy.
 """
 
 from __future__ import annotations
