@@ -12,6 +12,7 @@ and the JSON answer::
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -386,13 +387,22 @@ def selected(text: str) -> tuple[str, dict[str, float]]:
     return text, found
 
 
+@functools.cache
+def _by_first_word() -> dict[str, list[AnswerKind]]:
+    """Quantities by the first word of their names."""
+    found: dict[str, list[AnswerKind]] = {}
+    for kind in ANSWERS:
+        found.setdefault(kind.table or kind.name, []).append(kind)
+    return found
+
+
 def _named(text: str) -> AnswerName:
     """A name without selectors."""
     words = text.split(".")
     words[0] = {"prescribed": "motions"}.get(words[0], words[0])
-    kinds = [kind for kind in ANSWERS if (kind.table or kind.name) == words[0]]
-    if not kinds:
-        raise SceneError(unknown(words[0], dict.fromkeys(kind.table or kind.name for kind in ANSWERS)))
+    kinds = _by_first_word().get(words[0])
+    if kinds is None:
+        raise SceneError(unknown(words[0], _by_first_word()))
     first = kinds[0]
     if not first.table:
         return AnswerName(first) if len(words) == 1 else _refused(text, first)
