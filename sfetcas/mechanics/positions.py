@@ -224,23 +224,32 @@ class _Placing:
                 self.places[there] = self._across(there, found) if there in self.sliding else found
                 front.append(there)
 
-    def matrix(self, parts: list[_Place], height: int, kind: str, columns: int) -> SparseMap:
-        """The terms of one kind of all parts below each other, each of some height."""
-        shared: dict[int, tuple[Array, list[int], list[int]]] = {}
+    def matrices(self, parts: list[_Place], height: int) -> dict[str, SparseMap]:
+        """The terms of each kind of all parts below each other, each part of some height."""
+        shared: dict[str, dict[int, tuple[Array, list[int], list[int]]]] = {"E": {}, "Y": {}, "B": {}}
         for i, part in enumerate(parts):
-            for (source, number), matrix in part.terms.items():
-                if source == kind:
-                    _, rows, columns_of = shared.setdefault(id(matrix), (matrix, [], []))
-                    rows.append(i * height)
-                    columns_of.append(number if kind == "Y" else number * self.axes)
-        row, column, value = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], [np.zeros(0)]
-        for matrix, rows, columns_of in shared.values():
-            r, c = np.nonzero(matrix)
-            row.append((np.array(rows)[:, None] + r).ravel())
-            column.append((np.array(columns_of)[:, None] + c).ravel())
-            value.append(np.tile(matrix[r, c], len(rows)))
-        shape = (len(parts) * height, columns)
-        return SparseMap(np.concatenate(row), np.concatenate(column), np.concatenate(value), shape)
+            for (kind, number), matrix in part.terms.items():
+                _, rows, columns = shared[kind].setdefault(id(matrix), (matrix, [], []))
+                rows.append(i * height)
+                columns.append(number if kind == "Y" else number * self.axes)
+        segments = self.segments
+        sizes = {
+            "E": len(segments.parts) * self.axes,
+            "Y": len(self.labels),
+            "B": len(segments.places) * self.axes,
+        }
+        return {kind: _sparse(found, (len(parts) * height, sizes[kind])) for kind, found in shared.items()}
+
+
+def _sparse(shared: dict[int, tuple[Array, list[int], list[int]]], shape: tuple[int, int]) -> SparseMap:
+    """Matrices, each at several rows and columns, as one."""
+    row, column, value = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], [np.zeros(0)]
+    for matrix, rows, columns in shared.values():
+        r, c = np.nonzero(matrix)
+        row.append((np.array(rows)[:, None] + r).ravel())
+        column.append((np.array(columns)[:, None] + c).ravel())
+        value.append(np.tile(matrix[r, c], len(rows)))
+    return SparseMap(np.concatenate(row), np.concatenate(column), np.concatenate(value), shape)
 
 
 def place_nodes(
@@ -261,12 +270,8 @@ def place_nodes(
 
 
 def _positions(placing: _Placing) -> Positions:
-    segments, axes = placing.segments, placing.axes
-    sizes = {"E": len(segments.parts) * axes, "Y": len(placing.labels), "B": len(segments.places) * axes}
-    in_order = [placing.places[n] for n in segments.places]
-    closings = [place for _, place in placing.rows]
-    up = {kind: placing.matrix(in_order, axes, kind, size) for kind, size in sizes.items()}
-    low = {kind: placing.matrix(closings, 1, kind, size) for kind, size in sizes.items()}
+    up = placing.matrices([placing.places[n] for n in placing.segments.places], placing.axes)
+    low = placing.matrices([place for _, place in placing.rows], 1)
     return Positions(
         E=up["E"],
         Y=up["Y"],
