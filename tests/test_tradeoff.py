@@ -15,8 +15,9 @@ from scenes import cantilever, made
 from sfetcas import SceneError, SolveError, dump, load
 from sfetcas.analyses import solve
 from sfetcas.cli import main
+from sfetcas.mathematics.core import core
 from sfetcas.pictures.fronts import front_picture
-from sfetcas.tradeoff import trading
+from sfetcas.tradeoff import measuring, trading
 from sfetcas.tradeoff.machine import machine
 from sfetcas.tradeoff.measuring import Measurement, Timing, measure
 from sfetcas.tradeoff.observed import Observation, expected_error, observe
@@ -65,7 +66,23 @@ def test_other_ways_change_one_thing_each():
         "SFET5 x 4, nodal",
         "SFET5 x 4, newton",
         "SFET5 x 4, in space",
+        *(["SFET5 x 4, without the core"] if core() is not None else []),
     }
+
+
+def test_a_variant_without_the_core_does_without(monkeypatch):
+    asked, scene = [], made(cantilever())
+
+    def watched(*given):
+        asked.append(core())
+        return solve(*given)
+
+    monkeypatch.setattr(measuring, "solve", watched)
+    with_it, without = (measure(scene, Variant("SFET5", 4, core=use), 0) for use in (True, False))
+    assert (with_it.failure, without.failure) == ("", "")
+    assert asked[0] is core()
+    assert asked[-1] is None
+    assert core() is asked[0]
 
 
 def test_a_variant_replaces_what_the_scene_says_of_elements():

@@ -9,9 +9,11 @@ does not agree on the sizes of structures is not used.  ``$SFETCAS_CORE=off`` do
 from __future__ import annotations
 
 import contextlib
+import contextvars
 import ctypes
 import functools
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +51,7 @@ __all__ = [
     "doubles",
     "integers",
     "table_of",
+    "without_core",
 ]
 
 _int, _double, _pointer = ctypes.c_int, ctypes.c_double, ctypes.c_void_p
@@ -384,9 +387,22 @@ def _stretches(code: Array) -> Array:
     return integers(np.stack([code[first, 0], np.diff(first, append=len(code))], axis=1))
 
 
+_SWITCHED_OFF = contextvars.ContextVar("switched off", default=False)
+
+
+@contextlib.contextmanager
+def without_core() -> Iterator[None]:
+    """Do without the core within the block, as ``$SFETCAS_CORE=off`` does everywhere."""
+    token = _SWITCHED_OFF.set(True)
+    try:
+        yield
+    finally:
+        _SWITCHED_OFF.reset(token)
+
+
 def core() -> ctypes.CDLL | None:
     """The core; None where there is none, or where it is switched off."""
-    if os.environ.get("SFETCAS_CORE", "") == "off":
+    if _SWITCHED_OFF.get() or os.environ.get("SFETCAS_CORE", "") == "off":
         return None
     return _found(os.environ.get("SFETCAS_CACHE"), os.environ.get("SFETCAS_KERNELS") != "interpreted")
 

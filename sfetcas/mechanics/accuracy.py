@@ -28,6 +28,7 @@ __all__ = [
     "halving",
     "largest_difference",
     "remaining",
+    "remaining_by_order",
     "roughness",
     "roughness_of_change",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import statistics
 import sys
 import time
@@ -17,6 +18,7 @@ from ..equilibria.quantities import Quantity
 from ..equilibria.single import solve_model, unjudged
 from ..equilibria.solution import Equilibrium, Solution
 from ..errors import SceneError, SolveError
+from ..mathematics.core import without_core
 from ..mechanics.fields import transferred
 from ..mechanics.model import assemble
 from ..solvers.prepared import Prepared
@@ -137,7 +139,8 @@ def measure(scene: Scene, variant: Variant, repeats: int = 5, longest: float = 2
     Errors, as of a scene without solution, are recorded in ``failure``.
     """
     try:
-        return _measured(scene, variant, repeats, longest)
+        with contextlib.nullcontext() if variant.core else without_core():
+            return _measured(scene, variant, repeats, longest)
     except (SceneError, SolveError) as error:
         return Measurement(variant, failure=str(error), refused=isinstance(error, SceneError))
     except (FloatingPointError, OverflowError, np.linalg.LinAlgError, MemoryError) as error:

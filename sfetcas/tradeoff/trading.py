@@ -3,7 +3,8 @@
 1. A *reference*: the scene solved as finely as the library does, with its own estimate; or what the file expects.
 2. What the library chooses by itself, over the accuracy asked for.
 3. Families of meshes, from coarse to fine, until they gain nothing.
-4. Of the cheapest ones for errors of 1e-3, 1e-6 and 1e-9 the other ways: assembly, solver, kernels, space for plane.
+4. Of the cheapest ones for errors of 1e-3, 1e-6 and 1e-9 the other ways: assembly, solver, kernels, without the
+   core, space for plane.
 
 Each run has a process of its own: the first run is a first run, and memory is its own.
 """

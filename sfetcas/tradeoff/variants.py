@@ -14,6 +14,7 @@ from typing import Any, Literal
 from ..description.records import counted
 from ..description.scene import Scene
 from ..equilibria.settings import Settings
+from ..mathematics.core import core
 from ..mathematics.kernels import Kernels
 from ..mechanics.elements import ELEMENTS
 
@@ -64,6 +65,8 @@ class Variant:
         Steps in time of a motion.
     accuracy : float or None
         Where the library chooses.
+    core : bool
+        Whether equations are evaluated and solved by the core in C, where there is one.
     """
 
     element: str = ""
@@ -76,6 +79,7 @@ class Variant:
     integrator: str = ""
     steps: int | None = None
     accuracy: float | None = None
+    core: bool = True
 
     def settings(self) -> Settings:
         """The settings for :func:`sfetcas.solve`."""
@@ -121,6 +125,7 @@ class Variant:
         parts += [self.assembly] if self.assembly != "auto" else []
         parts += [self.solver] if self.solver != "ipopt" else []
         parts += [self.kernels] if self.kernels != "auto" else []
+        parts += ["without the core"] if not self.core else []
         parts += [f"in {self.dimension}"] if self.dimension else []
         return ", ".join(parts)
 
@@ -165,8 +170,12 @@ def _moving(flexible: int) -> Iterator[list[Variant]]:
 
 
 def other_ways(scene: Scene, variant: Variant, dimension: str) -> list[Variant]:
-    """Variants on the same mesh with another assembly, solver or kernels, and of a plane scene in space."""
+    """Variants on the same mesh with another assembly, solver or kernels, without the core, and of a plane scene in
+    space.
+    """
     moving, ways = scene.analysis.type == "dynamic", list[Variant]()
+    if core() is not None:
+        ways.append(replace(variant, core=False))
     if scene.analysis.type != "modes":
         ways += [replace(variant, kernels=kernels) for kernels in ("compiled", "interpreted")]
     if scene.analysis.type == "static":
