@@ -1,14 +1,28 @@
-"""CasADi functions as tapes, the lists of operations that the core runs."""
+"""CasADi functions as tapes, the lists of operations that the core runs.
+
+To read thousands of operations from CasADi one by one takes a tenth of a second, so long tapes are kept in the cache of
+compiled kernels, named by what their function is and by what they hold.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import hashlib
+import io
+import os
+import tempfile
+import zipfile
 from dataclasses import dataclass
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
 
+from ..core.building import named
+from ..files import UnreadableError, read_file
 from .arrays import Array
+from .kernels import cache_folder, private
 
 __all__ = ["KEPT", "NAMES", "Tape", "tape_of"]
 
@@ -34,6 +48,15 @@ OTHERS = {
 
 KEPT = 256
 """Functions whose tapes are kept at hand: those of the kinds of terms of some models."""
+
+
+LONG, LARGEST = 10_000, 10_000_000
+"""Bytes of a serialised function from which on its tape is kept, and of a file that is looked at."""
+
+SUFFIX = ".npz"
+
+FILES = 100
+"""Tapes that are kept on disk: laws with numbers of their own have their own functions, and there may be many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +94,49 @@ def _operations() -> dict[int, int]:
 @functools.lru_cache(maxsize=KEPT)
 def tape_of(function: ca.Function) -> Tape | None:
     """The tape of a function; None of one that has other operations than those of scalars."""
+    content, folder = function.serialize(), cache_folder()
+    if len(content) < LONG or folder is None:
+        return _read(function)
+    text = "\n".join([content, ca.CasadiMeta.version(), *NAMES])
+    key = f"tape-{hashlib.sha256(text.encode()).hexdigest()[:24]}-"
+    found = _kept(folder, key)
+    if found is None and (found := _read(function)) is not None:
+        _keep(folder, key, found)
+    return found
+
+
+def _kept(folder: Path, key: str) -> Tape | None:
+    """The tape in a file of a folder whose name begins so, if it is whole and nobody else can have put it there."""
+    with contextlib.suppress(OSError):
+        for path in sorted(folder.glob(f"{key}*{SUFFIX}")) if private(folder) else ():
+            with contextlib.suppress(UnreadableError, ValueError, KeyError, zipfile.BadZipFile):
+                content = read_file(path, LARGEST)
+                if named(key, content, SUFFIX) == path.name:
+                    with np.load(io.BytesIO(content), allow_pickle=False) as parts:
+                        slots, arguments, results = parts["sizes"].tolist()
+                        where = tuple(parts["parts"].tolist())
+                        return Tape(parts["code"], parts["constant"], slots, arguments, results, where)
+    return None
+
+
+def _keep(folder: Path, key: str, tape: Tape) -> None:
+    """Put a tape into a folder, if that is possible, and take out the oldest ones that are too many."""
+    content, sizes = io.BytesIO(), (tape.slots, tape.arguments, tape.results)
+    np.savez(content, code=tape.code, constant=tape.constant, sizes=sizes, parts=tape.parts)
+    with contextlib.suppress(OSError):
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if not private(folder):
+            return
+        with tempfile.TemporaryDirectory(dir=folder) as place:
+            made = Path(place) / "made"
+            made.write_bytes(content.getvalue())
+            os.replace(made, folder / named(key, content.getvalue(), SUFFIX))
+        for path in sorted(folder.glob(f"tape-*{SUFFIX}"), key=lambda path: path.stat().st_mtime)[:-FILES]:
+            path.unlink(missing_ok=True)
+
+
+def _read(function: ca.Function) -> Tape | None:
+    """The tape of a function from its instructions."""
     try:
         scalar = function if function.is_a("SXFunction") else function.expand()
     except RuntimeError:
