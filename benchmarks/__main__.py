@@ -1,7 +1,7 @@
 """Accuracy and speed measured: ``python -m benchmarks [NAME ...] [--save]``, from a clone of the repository.
 
 Names are order, loads, size, repeated, whole, derivatives, net, path, motion, steps, code, accuracy, pieces, sweep,
-batch, import, extremes and compared; left out, all are run.  ``--save`` writes what each prints into
+batch, estimates, import, extremes and compared; left out, all are run.  ``--save`` writes what each prints into
 ``benchmarks/results``, too.
 
 Others, ``random``, ``jitter``, ``contact``, ``members``, ``ways`` and ``heap``, stand alone, take options (``--help``)
@@ -18,7 +18,7 @@ from typing import Any
 
 from sfetcas.errors import SceneError, SolveError
 
-from .accuracy import knob
+from .accuracy import estimates, knob
 from .code import code
 from .compared import compared
 from .contact_run import contact
@@ -54,7 +54,7 @@ def main(words: list[str]) -> None:
         "motion": motion,
     }
     known |= {"steps": step_cost, "code": code, "accuracy": knob, "pieces": pieces, "sweep": many, "batch": batch}
-    known |= {"import": importing, "extremes": extremes, "compared": compared}
+    known |= {"estimates": estimates, "import": importing, "extremes": extremes, "compared": compared}
     alone: dict[str, Callable[[list[str]], None]] = {"random": random_scenes, "jitter": jitter}
     alone |= {"contact": contact, "members": members, "ways": ways, "heap": heap}
     if words[:1] and words[0] in alone:

@@ -21,7 +21,7 @@ from sfetcas.tradeoff.variants import Variant, families
 
 from .saving import head, row
 
-__all__ = ["knob", "problems_of", "static_problems"]
+__all__ = ["estimates", "knob", "problems_of", "static_problems"]
 
 ASKED = {
     "static": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
@@ -71,9 +71,13 @@ def knob() -> None:
     """Effectivity, share of answers that keep what was asked for, and time against the best mesh by hand."""
     scenes, references = _kept("static")
     _against_the_best(scenes, references)
-    for kind in ("modes", "path"):
-        print()
-        _kept(kind)
+
+
+def estimates() -> None:
+    """Effectivity, and share of answers that keep what was asked for, of modes and of paths."""
+    _kept("modes")
+    print()
+    _kept("path")
 
 
 NAMES = {"static": "statics", "modes": "modes", "path": "paths"}
