@@ -35,7 +35,7 @@ def rows(printed):
 def test_benchmark_of_another_name_is_refused():
     accepted = (
         "net, path, motion, steps, code, accuracy, pieces, sweep, batch, estimates, import, extremes, "
-        "random, jitter, contact, members, ways, heap"
+        "compared, random, jitter, contact, members, ways, heap"
     )
     with pytest.raises(SystemExit, match=rf"found benchmark 'nets', accepted: .*{accepted}$"):
         main(["nets"])
