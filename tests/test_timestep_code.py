@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -241,6 +242,62 @@ def test_loads_in_the_step_are_arguments():
 def test_a_step_that_fails_is_no_number():
     made = time_step(rod(), "motion")
     assert np.isnan(made.step(made.begin, 1e9, 1e9 * np.ones(3))).all()
+
+
+def test_steps_so_short_that_rates_are_rounding_are_none():
+    made = time_step(rod(), "motion")
+    assert np.isfinite(made.step(made.begin, 2.0 * made.shortest)).all()
+    assert np.isnan(made.step(made.begin, 0.5 * made.shortest)).all()
+
+
+def test_what_nothing_resists_is_not_exported():
+    """A rod that flies, turns about its axis and has no inertia there: the sentence of the motion."""
+    table = {
+        "dimension": "space",
+        "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0, "rhoA": 1.0}},
+        "nodes": {"A": {"position": [0, 0, 0]}, "B": {"position": [1, 0, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s", "elements": 2}},
+        "loads": {"t": {"type": "moment", "node": "B", "value": [0.3, 0.2, 0.1]}},
+    }
+    scene, sentence = motion_of(table), "without 'rhoI' of the section s some rotations have no inertia"
+    for run in (solve, lambda scene: time_step(scene, "motion")):
+        with pytest.raises(SceneError, match=sentence):
+            run(scene)
+
+
+@needs_core
+def test_threads_may_share_a_step():
+    made = time_step(rod(step=0.01), "motion")
+
+    def states(_):
+        state, found = made.begin, []
+        for _ in range(50):
+            state = made.step(state, 0.01)
+            found.append(state)
+        return np.array(found)
+
+    with ThreadPoolExecutor(4) as pool:
+        first, *others = pool.map(states, range(4))
+    assert np.isfinite(first).all()
+    assert all(np.array_equal(first, other) for other in others)
+
+
+@needs_compiler
+@pytest.mark.parametrize("flags", [["-O2", "-pedantic"], ["-O1", "-x", "c++"]])
+def test_scenes_without_arguments_compile_without_warnings(flags, tmp_path):
+    table = rod(step=0.01).to_dict()
+    table.pop("loads")
+    export(Scene.from_dict(table), tmp_path / "c", name="motion", arguments=[])
+    flags = [*flags, "-Wall", "-Wextra", "-Werror", "-fsanitize=undefined"]
+    compiler = "g++" if "c++" in flags else "gcc"
+    if shutil.which(compiler) is None:
+        pytest.skip(f"needs {compiler}")
+    assert "10 of 10" in said(built(tmp_path / "c", "motion", flags=flags, compiler=compiler))
+
+
+def test_names_of_what_is_inside_are_not_taken(tmp_path):
+    with pytest.raises(SceneError, match=r"found 'sf_take', accepted: .* not with sf_"):
+        export(rod(step=0.01), tmp_path / "c", name="sf_take")
 
 
 @needs_compiler

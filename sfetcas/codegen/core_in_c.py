@@ -175,6 +175,10 @@ class InC:
         return self._known[key]
 
 
+NONE: dict[str, type[ctypes.Structure]] = {"sf_group": c.Group, "sf_observables": c.Observables}
+"""Structures of which there are arrays, by their names in C."""
+
+
 class _Tables:
     """What the core takes of a model for generated C: definitions, sizes, and how much memory a call takes.
 
@@ -196,7 +200,8 @@ class _Tables:
         """Enter tables, arrays of structures, and structures."""
         self.texts += text.tables
         for name, values in lists.items():
-            inner = f",{chr(10)}  ".join(values) or "0"
+            # There are no empty arrays in C.
+            inner = f",{chr(10)}  ".join(values or [text.value(NONE[name.split()[0]]())])
             self.texts.append(f"static const {name}[] = {{\n  {inner}\n}};\n")
         self.texts += [f"static const {name} = {value};\n" for name, value in structures.items()]
 

@@ -153,14 +153,16 @@ def check_name(name: str) -> None:
     Raises
     ------
     SceneError
-        It is no identifier, longer than 60 characters, or a word of C or CMake or a module of Python.
+        It is no identifier, longer than 60 characters, begins as names inside do, or is a word of C or CMake or a
+        module of Python.
     """
     plain = re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII)
-    # Constants begin with the name in capitals; a loader may not hide what Python itself imports.
-    taken = f" {name} " in RESERVED or name.lower() == "sf" or name in sys.stdlib_module_names
+    # Constants begin with the name in capitals, what is inside with sf_; a loader may not hide what Python imports.
+    taken = f" {name} " in RESERVED or name.lower() == "sf" or name.startswith("sf_") or name in sys.stdlib_module_names
     if not plain or taken or keyword.iskeyword(name) or len(name) > 60:
         accepted = (
-            "a name of letters, digits and _ that begins with a letter and is no word of C or CMake or module of Python"
+            "a name of letters, digits and _ that begins with a letter, not with sf_, and is no word of C or CMake or"
+            " module of Python"
         )
         raise SceneError(f"found {say(name)}, accepted: {accepted}", ("name",))
 

@@ -17,7 +17,7 @@ from ..dynamics.core_steps import CoreStep, core_step
 from ..dynamics.impulses import Impulsive
 from ..dynamics.inertia import Inertia
 from ..dynamics.inertialess import refuse_spinning
-from ..dynamics.integrating import Stepper
+from ..dynamics.integrating import SHORTEST, Stepper
 from ..dynamics.methods import Method, Radau
 from ..dynamics.motion import Mover
 from ..dynamics.simulation import INTEGRATORS, Simulation
@@ -176,10 +176,16 @@ class TimeStep:
         """Times (times,) within a step at which arguments are needed, shares of the step."""
         return np.asarray(self.method.loaded)
 
+    @property
+    def shortest(self) -> float:
+        """The shortest step that is taken, s: in shorter ones rates would be rounding of places over their length."""
+        return float(SHORTEST * self.time)
+
     def step(self, state: Array, h: float, arguments: Array | None = None) -> Array:
         """The state (states,) after a step of h, s.
 
-        It is nan if Newton's method did not converge, or arguments are outside of their ranges.
+        It is nan if Newton's method did not converge, arguments are outside of their ranges, or the step is shorter
+        than :attr:`shortest`.
 
         Parameters
         ----------
@@ -189,7 +195,7 @@ class TimeStep:
             Constant during the step, or at its :attr:`times`; by default the values of the scene.
         """
         p = self._values(arguments)
-        if not all(map(self.arguments.accepted, p)):
+        if not h >= self.shortest or not all(map(self.arguments.accepted, p)):
             return np.full(len(state), np.nan)
         if self.by_core is not None:
             after, size, *_ = self.by_core.after(self.system.rows(p), h / self.time, state)
@@ -265,7 +271,11 @@ def time_step(
     moved = [memory.q.ravel(), memory.y, memory.lam, still, memory.x, memory.rates.ravel(), memory.unwrapped]
     if isinstance(method, Impulsive):
         moved += method.beginning(own, begun)
-    return TimeStep(name, scene, known, outputs, system, method, own.masses.time, np.concatenate([*moved, np.zeros(1)]))
+    first = np.concatenate([*moved, np.zeros(1)])
+    made = TimeStep(name, scene, known, outputs, system, method, own.masses.time, first)
+    if made.by_core is not None and np.isnan(made.step(made.begin, made.usual)).any():
+        simulation.refuse_unresisted(own, begun)
+    return made
 
 
 def _method(simulation: Simulation) -> Method:

@@ -23,7 +23,8 @@ DONE = (
     (
         "BAD_ARGUMENT",
         2,
-        "no step: its length is not positive, an argument outside of its range, or the state not a finite number",
+        "no step: its length is so short that rates would be rounding, or no length, an argument outside of its range, "
+        "or the state not a finite number",
     ),
 )
 """Result codes of a step: name, number, meaning."""
@@ -100,6 +101,7 @@ class StepWriter(Writer):
             declared = f"\n  double numbers[{tables.numbers}];\n  int whole[{tables.whole}];"
         return {
             "core_declared": declared,
+            "shortest": f"{self.step.shortest:.3g}",
             "method": self.step.method.name,
             "n_times": len(self.step.times),
             "sz_p": self._columns,
@@ -121,7 +123,7 @@ class StepWriter(Writer):
         """The first state, the times within a step at which arguments are needed, the limit of convergence; the core
         and what it takes.
         """
-        constants: dict[str, float] = {"CONVERGED": LAST_CHANGE}
+        constants: dict[str, float] = {"CONVERGED": LAST_CHANGE, "SHORTEST": self.step.shortest}
         if self._tables is not None:
             constants |= self._tables.constants | {"SOLVED_TO": SOLVED, "TIME": float(self.step.time)}
         of_core = [] if self._tables is None else [*core_in_c("motion.c"), *self._tables.texts]

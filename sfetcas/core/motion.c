@@ -8,6 +8,7 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "core.h"
 
@@ -492,6 +493,9 @@ int sf_advance(const sf_model *m, const sf_motion *o, sf_system *system, sf_adva
   sf_work work;
   double scale[SF_KEPT];
   int here = 0, k, broken;
+  /* Compilers do not see that all of it is set. */
+  memset(&room, 0, sizeof room);
+  memset(&work, 0, sizeof work);
   sf_make_stage_room(m, o, memory, &room);
   sf_divide(m, p->work, &work);
   work.in = room.in;

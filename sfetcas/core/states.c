@@ -22,7 +22,9 @@ static void sf_lay_out(const sf_model *m, double *numbers, sf_state *state) {
   state->unwrapped = state->lam + m->rows;
 }
 
-static void sf_copy(double *to, const double *from, int n) { memcpy(to, from, (size_t)n * sizeof(double)); }
+static void sf_copy(double *to, const double *from, int n) {
+  if (n > 0) memcpy(to, from, (size_t)n * sizeof(double));
+}
 
 static int sf_is_finite(double x) { return x - x == 0.0; }
 

@@ -70,7 +70,8 @@ static double sf_other(int operation, double x, double y) {
 #undef LANES
 #undef SF_WIDE
 /* Wider vector instructions where the processor has them: the same operations, and the same bits. */
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_THREAD__)
 #define SF_WIDE __attribute__((target_clones("avx2", "default")))
 #else
 #define SF_WIDE

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import threading
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -86,7 +87,7 @@ class CoreStep:
     def __init__(self, system: StageEquations, method: StageMethod, turning: Tape | None, tapes: list[Tape]) -> None:
         library = c.core()
         assert library is not None
-        self._system, self._method, self._library = system, method, library
+        self._system, self._method, self._library, self._lock = system, method, library, threading.Lock()
         known = core_layout(system.equations.layout, system.model, method.stages)
         self._layout = layout = known.beside()
         total = layout.model.total
@@ -500,8 +501,10 @@ class CoreStep:
         found, step, memory = np.empty(len(state)), c.Advance(), np.empty(library.sf_take_step_size(*tables))
         numbers = (h, rows.ctypes.data, state.ctypes.data, found.ctypes.data)
         room = (ctypes.addressof(self._point), memory.ctypes.data, ctypes.addressof(step))
-        while (broken := library.sf_take_step(*tables, solver.address, *numbers, *room)) == NO_ROOM:
-            solver.make_room()
+        # One call at a time has the memory of the model.
+        with self._lock:
+            while (broken := library.sf_take_step(*tables, solver.address, *numbers, *room)) == NO_ROOM:
+                solver.make_room()
         if broken:
             found[...], step.size, step.gap = np.nan, np.nan, np.nan
         return found, step.size, step.iterations, step.gap

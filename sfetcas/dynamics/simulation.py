@@ -234,7 +234,7 @@ class Simulation:
             run.interrupted = True
         except SolveError as error:
             if not run.instants:
-                check_resisted(equations, _resistance(system, begun))
+                self.refuse_unresisted(system, begun)
             if error.status is Status.STOPPED:
                 hints = {TAUT: lacks_slack(equations), SNAPS: self.weightless, ALONG: bool(meeting)}
                 if hint := next((words for words, true in hints.items() if true), ""):
@@ -277,6 +277,16 @@ class Simulation:
         limit = instant.fields.beyond_limits() if self.scene.limited else None
         if limit is not None:
             raise SolveError(limit.status, f"at {instant.time:.6g} s: {limit.detail}")
+
+    def refuse_unresisted(self, system: StageEquations, begun: InitialState) -> None:
+        """Refuse what neither inertia nor stiffness resists where the motion begins.
+
+        Raises
+        ------
+        SceneError
+            Names sections, members or nodes.
+        """
+        check_resisted(system.equations, _resistance(system, begun))
 
     def begun(self, system: StageEquations, free: Equations | None = None) -> tuple[InitialState, tuple[str, ...]]:
         """Where the motion begins, and what is to be said of it; ``free`` are equations without unilateral ones."""

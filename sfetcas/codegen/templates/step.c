@@ -24,7 +24,7 @@ int @name@_step_through(@name@_memory *m, double h, const double *arguments, dou
   int status = @NAME@_DONE, i;
   if (results)
     for (i = 0; i < @NAME@_RESULTS; ++i) results[i] = NAN;
-  if (!(h > 0.0) || h - h != 0.0 || !sf_accepted(arguments) || !sf_all_finite(state, @NAME@_STATE)) {
+  if (!(h >= SF_SHORTEST) || h - h != 0.0 || !sf_accepted(arguments) || !sf_all_finite(state, @NAME@_STATE)) {
     status = @NAME@_BAD_ARGUMENT;
     m->iterations = 0.0;
     m->gap = NAN;

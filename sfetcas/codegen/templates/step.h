@@ -57,7 +57,7 @@ void @name@_times(double *shares);
 
 /* Step.
  *
- * h          length of the step, s
+ * h          length of the step, s, at least @shortest@
  * arguments  @NAME@_ARGUMENTS numbers, the same throughout the step
  * state      @NAME@_STATE numbers, before and after; as it was where the step failed
  * results    @NAME@_RESULTS numbers after the step, or 0; not a number where it failed
