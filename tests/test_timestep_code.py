@@ -48,6 +48,11 @@ def test_c_takes_the_steps_of_the_integrator(name, tmp_path):
                          said(built(tmp_path / "c", "motion")))  # fmt: skip
     assert words
     assert words[1] == words[2] == words[3] == "10"
+    # Something moves in them.
+    cases = (tmp_path / "c" / "check.c").read_text().partition("expected[STEPS]")[2].partition("};")[0]
+    steps = [re.findall(r"[-+.e0-9]+", line) for line in re.findall(r"\{([^{}]*)\}", cases)]
+    assert len(steps) == 10
+    assert steps[0] != steps[-1]
 
 
 @needs_compiler

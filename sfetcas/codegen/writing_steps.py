@@ -9,6 +9,7 @@ import numpy as np
 
 from ..description.records import counted
 from ..dynamics.steps import LAST_CHANGE
+from ..mathematics.arrays import Array
 from ..mathematics.linear import SOLVED
 from ..mathematics.source import table
 from .core_in_c import StepTables, core_in_c
@@ -137,18 +138,29 @@ class StepWriter(Writer):
 
     @property
     def cases(self) -> dict[str, object]:
-        """Results after the first steps, with arguments that change a little within and between steps."""
-        step, state = self.step, self.step.begin
-        arguments, results = [], []
-        for number in range(CHECKED):
-            shares = 1.0 + 0.01 * (number + step.times)
-            p = np.clip(shares[:, None] * self.arguments.defaults, *self.limits)
-            state = step.step(state, step.usual, p)
-            arguments.append(p.ravel())
-            results.append(step.outputs(state, p[-1]))
+        """Results after the first steps, with arguments that change a little within and between steps; histories that
+        begin with zero grow, so that something moves, unless that is too much for a step.
+        """
+        histories = [one.name.startswith("histories.") for one in self.arguments.arguments for _ in one.default]
+        growing = np.array(histories, dtype=float) * (self.arguments.defaults == 0.0)
+        arguments, results = self._steps(growing)
+        if growing.any() and not np.isfinite(results).all():
+            arguments, results = self._steps(0.0 * growing)
         return {
             "n_cases": CHECKED,
             "case_arguments": rows(arguments),
             "case_results": rows(results),
             "units": row(self.units(results)),
         }
+
+    def _steps(self, growing: Array) -> tuple[list[Array], list[Array]]:
+        """Arguments and results of the steps of the check, to some of the arguments something is added."""
+        step, state = self.step, self.step.begin
+        arguments, results = [], []
+        for number in range(CHECKED):
+            parts = 0.01 * (number + step.times)[:, None]
+            p = np.clip((1.0 + parts) * self.arguments.defaults + parts * growing, *self.limits)
+            state = step.step(state, step.usual, p)
+            arguments.append(p.ravel())
+            results.append(step.outputs(state, p[-1]))
+        return arguments, results
