@@ -3,6 +3,7 @@
 import numpy as np
 
 from sfetcas.mathematics import quaternion as quat
+from sfetcas.mathematics.arrays import cross
 
 RNG = np.random.default_rng(1)
 PHI = RNG.normal(size=(20, 3))
@@ -15,8 +16,8 @@ ROUNDING = 1e-14  # some ten operations on numbers of order one
 def rodrigues(phi):
     angle = np.linalg.norm(phi)
     k = phi / angle
-    cross = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    matrix = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
+    return np.eye(3) + np.sin(angle) * matrix + (1 - np.cos(angle)) * matrix @ matrix
 
 
 def test_rotation_vector_is_rodrigues_formula():
@@ -86,3 +87,14 @@ def test_rotation_vectors_are_read_back():
 def test_cross_matrices_multiply_as_cross_products():
     v, w = np.random.default_rng(6).normal(size=(2, 5, 3))
     np.testing.assert_allclose(np.einsum("nij,nj->ni", quat.cross_matrix(v), w), np.cross(v, w), atol=4 * ROUNDING)
+
+
+def test_single_ones_are_turned_as_many_are():
+    """To the last bit: formulas are the same, with floats instead of arrays."""
+    rng = np.random.default_rng(3)
+    for q, p in rng.standard_normal((200, 2, 4)):
+        assert np.array_equal(quat.multiply(q, p), quat.multiply(q[None], p[None])[0])
+        assert np.array_equal(quat.rotate(q, p[1:]), quat.rotate(q[None], p[None, 1:])[0])
+        assert np.array_equal(cross(q[1:], p[1:]), np.cross(q[1:], p[1:]))
+    vectors = rng.standard_normal((2, 5, 3))
+    assert np.array_equal(cross(*vectors), np.cross(*vectors))

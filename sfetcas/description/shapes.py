@@ -19,7 +19,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
-from ..mathematics.arrays import first_of_largest, fixed, length_of, numbers, values_of
+from ..mathematics.arrays import cross, first_of_largest, fixed, length_of, numbers, values_of
 from ..mathematics.curves import (
     FORWARD,
     POINTS,
@@ -363,13 +363,13 @@ def _frame(tangent: Floats, b2: Floats | None) -> Floats:
             b2 = np.array([0.0, 1.0, 0.0])
     elif not b2.any():
         raise SceneError("found a vector of zero length, accepted: a direction across the member", ("b2",))
-    elif (angle := _norm(np.cross(tangent, _unit(b2)))) <= tolerances.PARALLEL:
+    elif (angle := _norm(cross(tangent, _unit(b2)))) <= tolerances.PARALLEL:
         found = f"found {_say(b2)}, {angle:.3g} rad off the tangent at the first node {_say(tangent)}"
         raise SceneError(f"{found}, accepted: a direction across the member", ("b2",))
     for _ in range(2):  # once more, since a first projection of a nearly parallel vector loses digits
         b2 = _unit(b2)
         b2 = _unit(b2 - (b2 @ tangent) * tangent)
-    return _quaternion(np.column_stack([tangent, b2, np.cross(tangent, b2)]))
+    return _quaternion(np.column_stack([tangent, b2, cross(tangent, b2)]))
 
 
 def _quaternion(turn: Floats) -> Floats:
@@ -412,7 +412,7 @@ def _arc(shape: Arc, start: Floats, chord: Floats, b2: Floats | None) -> tuple[f
         )
     half = 0.5 * shape.angle
     direction = _unit(chord)
-    tangent = np.cos(half) * direction - np.sin(half) * np.cross(normal, direction)
+    tangent = np.cos(half) * direction - np.sin(half) * cross(normal, direction)
     if shape.start is not None:
         _check_start(values_of(numbers(shape.start)), values_of(tangent))
     first = _frame(_unit(tangent), b2)
@@ -421,7 +421,7 @@ def _arc(shape: Arc, start: Floats, chord: Floats, b2: Floats | None) -> tuple[f
 
 
 def _check_start(start: Floats, tangent: Floats) -> None:
-    angle = math.atan2(_norm(np.cross(_unit(start), tangent)), _unit(start) @ tangent)
+    angle = math.atan2(_norm(cross(_unit(start), tangent)), _unit(start) @ tangent)
     if angle > tolerances.PARALLEL:
         found = f"found {_say(start)}, {angle:.3g} rad off the tangent {_say(tangent)} that angle and nodes give"
         raise SceneError(f"{found}, accepted: up to {tolerances.PARALLEL:g} rad, or no start", ("shape", "start"))
@@ -435,7 +435,7 @@ def _helix(shape: Helix, start: Floats, b2: Floats | None) -> tuple[float, Curve
     if abs(_norm(outward) - shape.radius) > min(FITS * length, 0.5 * shape.radius):
         found = f"found {shape.radius:.9g}, but the first node is {_norm(outward):.9g} m from the axis"
         raise SceneError(f"{found}, accepted: the same to {FITS:g} of the length", ("shape", "radius"))
-    round_about = 2.0 * math.pi * shape.radius * np.cross(axis, _unit(outward))
+    round_about = 2.0 * math.pi * shape.radius * cross(axis, _unit(outward))
     tangent = _unit(round_about + shape.pitch * axis)
     first = _frame(tangent, -outward if b2 is None else b2)
     return length, Screw(first=first, axis=axis, turns=shape.turns)
@@ -482,7 +482,7 @@ def _spline(shape: Spline, start: Floats, b2: Floats | None) -> tuple[float, Cur
         slope, bend = derivatives(cubics, np.floor(left).astype(int), at)
         with np.errstate(divide="ignore", invalid="ignore"):
             speed = np.linalg.norm(slope, axis=2, keepdims=True)
-            rates = arcs.sum() * np.cross(slope, bend) / speed**3
+            rates = arcs.sum() * cross(slope, bend) / speed**3
             even = speeds / speeds.mean(axis=1, keepdims=True)
         return arcs / arcs.sum(), rates, even[:, :, None]
 

@@ -14,6 +14,7 @@ __all__ = [
     "Array",
     "Index",
     "Sparse",
+    "cross",
     "first_of_largest",
     "fixed",
     "length_of",
@@ -123,6 +124,15 @@ def unit(vectors: object) -> Array:
     return numbers(v / np.linalg.norm(v, axis=-1, keepdims=True))
 
 
+def cross(a: Any, b: Any) -> Array:
+    """Cross product of vectors (..., 3)."""
+    if type(a) is type(b) is np.ndarray and a.shape == b.shape == (3,):
+        # NumPy's own takes twenty times as long for single vectors.
+        (x, y, z), (u, v, w) = a.tolist(), b.tolist()
+        return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
+    return np.cross(a, b)
+
+
 def length_of(vector: Array) -> Any:
     """Length of a vector (n,), in its unit, also where squares of components overflow or underflow."""
     return math.hypot(*vector) if isinstance(vector, np.ndarray) else np.linalg.norm(vector)
@@ -136,5 +146,5 @@ def normals(direction: Array) -> Array:
     # From the axis that is the farthest from it, of those as far the first.
     sizes, axis = np.abs(d), np.zeros(3)
     axis[int(np.argmax(sizes <= sizes.min() + tolerances.ALIKE))] = 1.0
-    first = unit(np.cross(d, axis))
-    return numbers([first, np.cross(d, first)])
+    first = unit(cross(d, axis))
+    return numbers([first, cross(d, first)])

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from .arrays import fixed, length_of, numbers, unit, values_of
+from .arrays import cross, fixed, length_of, numbers, unit, values_of
 from .interpolation import gauss, legendre_values
 from .quaternion import conjugate, multiply, product, rotate
 
@@ -86,7 +86,7 @@ class Screw(Curve):
         forward = np.sin(2.0 * math.pi * rest) / total
         aside = 2.0 * np.sin(math.pi * rest) ** 2 / total
         return numbers(
-            np.outer(x, along) + np.outer(forward, tangent - along) + np.outer(aside, np.cross(self.axis, tangent))
+            np.outer(x, along) + np.outer(forward, tangent - along) + np.outer(aside, cross(self.axis, tangent))
         )
 
     def quaternions(self, x: Floats) -> Floats:

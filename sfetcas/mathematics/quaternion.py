@@ -11,7 +11,7 @@ Source: Barraco and Munteanu, A special finite element ..., Part 1, section 2.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -86,8 +86,15 @@ def _stacked(parts: list[Array]) -> Array:
     return found
 
 
+def _single(a: ArrayLike) -> TypeGuard[Array]:
+    """Whether this is an array of one quaternion or vector: the formulas take a tenth of the time with its floats."""
+    return type(a) is np.ndarray and a.ndim == 1 and a.dtype == float
+
+
 def multiply(a: ArrayLike, b: ArrayLike) -> Array:
     """Product of quaternion arrays of shape (..., 4), broadcast against each other."""
+    if _single(a) and _single(b):
+        return np.array(product(a.tolist(), b.tolist()))
     return _stacked(product(_components(a), _components(b)))
 
 
@@ -98,6 +105,8 @@ def conjugate(q: ArrayLike) -> Array:
 
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:
     """``R(q) v``: vectors v (..., 3), in any unit, rotated by unit quaternions q (..., 4)."""
+    if _single(q) and _single(v):
+        return np.array(turned(q.tolist(), v.tolist()))
     return _stacked(turned(_components(q), _components(v)))
 
 
