@@ -30,8 +30,8 @@ DONE = (
 )
 """Result codes of a step: name, number, meaning."""
 
-CHECKED = 10
-"""Number of steps of the check."""
+CHECKED, GROWTHS = 10, (1e-2, 1e-4, 1e-6, 0.0)
+"""Number of steps of the check, and by how much histories that begin with zero grow in one, if that is not too much."""
 
 
 class StepWriter(Writer):
@@ -139,13 +139,14 @@ class StepWriter(Writer):
     @property
     def cases(self) -> dict[str, object]:
         """Results after the first steps, with arguments that change a little within and between steps; histories that
-        begin with zero grow, so that something moves, unless that is too much for a step.
+        begin with zero grow, so that something moves, as much as steps of this length take.
         """
         histories = [one.name.startswith("histories.") for one in self.arguments.arguments for _ in one.default]
         growing = np.array(histories, dtype=float) * (self.arguments.defaults == 0.0)
-        arguments, results = self._steps(growing)
-        if growing.any() and not np.isfinite(results).all():
-            arguments, results = self._steps(0.0 * growing)
+        for growth in GROWTHS if growing.any() else (0.0,):
+            arguments, results = self._steps(growth * growing)
+            if np.isfinite(results).all():
+                break
         return {
             "n_cases": CHECKED,
             "case_arguments": rows(arguments),
@@ -158,8 +159,8 @@ class StepWriter(Writer):
         step, state = self.step, self.step.begin
         arguments, results = [], []
         for number in range(CHECKED):
-            parts = 0.01 * (number + step.times)[:, None]
-            p = np.clip((1.0 + parts) * self.arguments.defaults + parts * growing, *self.limits)
+            parts = (number + step.times)[:, None]
+            p = np.clip((1.0 + 0.01 * parts) * self.arguments.defaults + parts * growing, *self.limits)
             state = step.step(state, step.usual, p)
             arguments.append(p.ravel())
             results.append(step.outputs(state, p[-1]))
