@@ -21,7 +21,7 @@ from sfetcas.tradeoff.variants import Variant, families
 
 from .saving import head, row
 
-__all__ = ["estimates", "knob", "problems_of", "static_problems"]
+__all__ = ["estimates", "knob", "problems_of"]
 
 ASKED = {
     "static": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
@@ -45,11 +45,6 @@ FINEST = {"static": 1e-11, "modes": 1e-11, "path": 1e-8}
 EXACT = {"static": 1e-13, "modes": 1e-10, "path": 3e-9}
 """Errors below this are rounding, or of what others are compared with: no estimate can be told right or wrong by them.
 """
-
-
-def static_problems() -> dict[str, Scene]:
-    """Scenes of statics in the folder ``problems``, by their names; raises as :func:`problems_of`."""
-    return problems_of("static")
 
 
 def problems_of(kind: str) -> dict[str, Scene]:

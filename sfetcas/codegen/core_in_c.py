@@ -18,7 +18,7 @@ from ..mathematics import core as c
 from ..mathematics.arrays import Array, Index
 from ..mathematics.core import TapeTable
 from ..mathematics.linear import factor_tables, last_rows, pivot_order
-from ..mathematics.source import table
+from ..mathematics.source import in_lines, table
 from ..mathematics.tapes import NAMES
 from ..mechanics.evaluation import Handed, handed
 from ..parametric.equilibrium import EquilibriumSolver
@@ -168,9 +168,7 @@ class InC:
         key = (kind, rows.tobytes())
         if key not in self._known:
             self._known[key] = f"sf_t{len(self._known)}"
-            # There are tens of thousands: without spaces.
-            lines = (",".join(map(str, part.ravel().tolist())) for part in np.split(rows, range(8, len(rows), 8)))
-            inner = ",\n".join(lines) or "0"
+            inner = in_lines(list(map(str, rows.ravel().tolist())) or ["0"])
             self.tables.append(f"static const {kind} {self._known[key]}[{max(len(rows), 1)}] = {{\n{inner}\n}};\n")
         return self._known[key]
 
@@ -216,8 +214,8 @@ class _Tables:
         self.numbers += stages * (sum(sizes) + inputs)
 
     def _pivot(self, n: int, row: Index, column: Index, order: Array) -> None:
-        """Enter what factors with pivots take; those of orthogonal factors hold them, whatever the pivots are (George
-        and Ng 1985).
+        """Enter what factors with pivots take: as much room as orthogonal factors, whose patterns hold those of factors
+        with any pivots (George and Ng 1985).
         """
         own = ca.Sparsity.triplet(n, n, row.tolist(), np.argsort(order)[column].tolist())
         room = n + max((part.nnz() for part in own.qr_sparse(False)[:2]), default=0) if n else 1

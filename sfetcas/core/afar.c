@@ -75,7 +75,6 @@ int sf_find_size(const sf_model *m, const sf_rules *rules, const sf_inputs *inpu
   return sf_make_run(m, rules, inputs, NULL, &none);
 }
 
-
 static void sf_look(sf_run_of *run, sf_here *here) {
   const sf_model *m = run->m;
   double gaps = 0.0;

@@ -129,37 +129,39 @@ static int sf_pivot_again(sf_pivoted *f, const double *entries) {
   return 0;
 }
 
+/* Which pivots factors have, and their patterns, in six parts. */
+static int *sf_part_of_pivots(const sf_pivoted *f, int part) {
+  int *const parts[] = {f->place, f->row_of, f->lower, f->upper, f->lower_row, f->upper_row};
+  return parts[part];
+}
+
+static int sf_size_of_part(const sf_pivoted *f, int part) {
+  return part < 2 ? f->n : part < 4 ? f->n + 1 : part < 5 ? f->lower[f->n] : f->upper[f->n];
+}
+
 /* Which pivots the last factors have, and their patterns, one after the other: the number of these numbers; 0 where no
  * matrix was factorised.  pivots: NULL, or so many.
  */
 int sf_pivots(const sf_pivoted *f, int *pivots) {
-  int n = f->n, k, l = 0, number;
-  const int *part[6], size[6] = {n, n, n + 1, n + 1, f->known ? f->lower[n] : 0, f->known ? f->upper[n] : 0};
+  int part, k, count = 0;
   if (!f->known) return 0;
-  part[0] = f->place;
-  part[1] = f->row_of;
-  part[2] = f->lower;
-  part[3] = f->upper;
-  part[4] = f->lower_row;
-  part[5] = f->upper_row;
-  for (number = 0; number < 6; ++number)
-    for (k = 0; k < size[number]; ++k, ++l)
-      if (pivots) pivots[l] = part[number][k];
-  return l;
+  for (part = 0; part < 6; ++part) {
+    const int *from = sf_part_of_pivots(f, part);
+    for (k = 0; k < sf_size_of_part(f, part); ++k, ++count)
+      if (pivots) pivots[count] = from[k];
+  }
+  return count;
 }
 
 /* Take these pivots for the next matrix. */
 static void sf_take_pivots(sf_pivoted *f, const int *pivots) {
-  int n = f->n, k;
-  for (k = 0; k < n; ++k) {
-    f->place[k] = *pivots++;
-    f->x[k] = 0.0;
+  int part, k;
+  for (part = 0; part < 6; ++part) {
+    int *to = sf_part_of_pivots(f, part);
+    /* How long the last two are stands in those before. */
+    for (k = 0; k < sf_size_of_part(f, part); ++k) to[k] = *pivots++;
   }
-  for (k = 0; k < n; ++k) f->row_of[k] = *pivots++;
-  for (k = 0; k <= n; ++k) f->lower[k] = *pivots++;
-  for (k = 0; k <= n; ++k) f->upper[k] = *pivots++;
-  for (k = 0; k < f->lower[n]; ++k) f->lower_row[k] = *pivots++;
-  for (k = 0; k < f->upper[n]; ++k) f->upper_row[k] = *pivots++;
+  for (k = 0; k < f->n; ++k) f->x[k] = 0.0;
   f->known = 1;
 }
 

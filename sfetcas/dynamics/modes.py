@@ -489,8 +489,12 @@ def _difference(coarse: Eigenmotions, fine: Eigenmotions) -> float:
     """Largest relative difference of frequencies; what a coarse mesh does not have is as far off as can be."""
     if len(coarse.omega) != len(fine.omega) or coarse.rigid != fine.rigid:
         return 1.0
-    sizes = np.maximum(np.abs(fine.exponents), TINY)
-    return float((np.abs(coarse.exponents - fine.exponents) / sizes).max(initial=0.0))
+    return float(_differences(coarse, fine).max(initial=0.0))
+
+
+def _differences(coarse: Eigenmotions, fine: Eigenmotions) -> Array:
+    """Relative differences (n,) of as many frequencies."""
+    return np.asarray(np.abs(coarse.exponents - fine.exponents) / np.maximum(np.abs(fine.exponents), TINY))
 
 
 def _roughness(motion: SmallMotion, found: Eigenmotions) -> Array:
@@ -505,7 +509,7 @@ def _remaining(coarse: Eigenmotions, fine: Eigenmotions, before: Array, after: A
     """
     if not len(after) or len(after) != len(before) or coarse.rigid != fine.rigid:
         return _difference(coarse, fine)
-    differences = np.abs(coarse.exponents - fine.exponents) / np.maximum(np.abs(fine.exponents), TINY)
+    differences = _differences(coarse, fine)
     # What the order of frequencies, 2 p, leaves may be too little on coarse meshes, roughness where symmetry makes it
     # vanish: the larger one counts.
     left = np.maximum(np.maximum(ROUGH * after**2, remaining_by_order(differences, 2 * order)), BLURRED)

@@ -13,14 +13,13 @@ import contextvars
 import ctypes
 import functools
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ..core.building import SOURCES, compile_core, prefix, whole
 from .arrays import Array
-from .kernels import cache_folder, private
+from .kernels import cache_folder, private, switched_on
 from .tapes import KEPT, NAMES, Tape
 
 __all__ = [
@@ -390,14 +389,9 @@ def _stretches(code: Array) -> Array:
 _SWITCHED_OFF = contextvars.ContextVar("switched off", default=False)
 
 
-@contextlib.contextmanager
-def without_core() -> Iterator[None]:
-    """Do without the core within the block, as ``$SFETCAS_CORE=off`` does everywhere."""
-    token = _SWITCHED_OFF.set(True)
-    try:
-        yield
-    finally:
-        _SWITCHED_OFF.reset(token)
+def without_core() -> contextlib.AbstractContextManager[None]:
+    """Context manager within which there is no core, as with ``$SFETCAS_CORE=off`` everywhere."""
+    return switched_on(_SWITCHED_OFF)
 
 
 def core() -> ctypes.CDLL | None:

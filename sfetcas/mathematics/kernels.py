@@ -32,7 +32,18 @@ from ..files import UnreadableError, read_file
 from .arrays import Array
 from .source import loadable
 
-__all__ = ["Batch", "Kernels", "cache_folder", "chosen", "compiled", "interpreted", "private"]
+__all__ = [
+    "Batch",
+    "Kernels",
+    "cache_folder",
+    "chosen",
+    "compiled",
+    "interpreted",
+    "made_apart",
+    "private",
+    "switched_on",
+    "whole_files",
+]
 
 Kernels = Literal["auto", "core", "compiled", "interpreted"]
 """How equations are evaluated: by the core, or in Python with functions of elements compiled or interpreted."""
@@ -52,8 +63,8 @@ COMPILE_SECONDS_PER_INSTRUCTION = 8e-5
 """What the compiler spends on an instruction (measured: 16,000 instructions in 1.3 s)."""
 
 
-LARGEST = 100_000_000
-"""Bytes of a library that is looked at; those of kernels have up to a few million."""
+LIBRARY, LARGEST = ".so", 100_000_000
+"""End of the names of libraries, and bytes of a file that is looked at; those of kernels have up to a few million."""
 
 RULER = 0
 """Who may do anything on a machine, by number."""
@@ -96,11 +107,6 @@ def _key(function: ca.Function) -> str:
     return f"{function.name()}-{hashlib.sha256(content.encode()).hexdigest()[:24]}-"
 
 
-def _named(key: str, library: bytes) -> str:
-    """Name of a library with its checksum."""
-    return named(key, library, ".so")
-
-
 def private(folder: Path) -> bool:
     """Whether only this user, or the one who rules the machine, can have put anything into a folder."""
     found = folder.stat()
@@ -119,14 +125,49 @@ def private(folder: Path) -> bool:
     return True
 
 
+def whole_files(folder: Path, key: str, suffix: str) -> Iterator[tuple[Path, bytes]]:
+    """Files of a folder whose names begin so and which hold what their names say, with their contents.
+
+    None of a folder into which others may have put them.
+
+    Raises
+    ------
+    OSError
+        There is no such folder.
+    """
+    if private(folder):
+        for path in (folder / entry for entry in os.listdir(folder) if entry.startswith(key)):
+            with contextlib.suppress(UnreadableError):
+                content = read_file(path, LARGEST)
+                if named(key, content, suffix) == path.name:
+                    yield path, content
+
+
+@contextlib.contextmanager
+def made_apart(folder: Path) -> Iterator[Path | None]:
+    """A place within a folder for what is then moved into it in one step; None where others may write to the folder.
+
+    What is left at the place goes with it.
+
+    Raises
+    ------
+    OSError
+        The folder cannot be made, or not be written to.
+    """
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if not private(folder):
+        yield None
+        return
+    with tempfile.TemporaryDirectory(dir=folder) as place:
+        yield Path(place)
+
+
 @functools.lru_cache(maxsize=LOADED)
 def _loaded(name: str, key: str, folder: Path) -> ca.Function:
     """The function in the library of a key; OSError where there is none that is whole and can be loaded."""
-    if private(folder):
-        for path in (folder / entry for entry in os.listdir(folder) if entry.startswith(key)):
-            with contextlib.suppress(UnreadableError, RuntimeError):
-                if _named(key, read_file(path, LARGEST)) == path.name:
-                    return ca.external(name, str(path))
+    for path, _ in whole_files(folder, key, LIBRARY):
+        with contextlib.suppress(RuntimeError):
+            return ca.external(name, str(path))
     raise FileNotFoundError
 
 
@@ -152,16 +193,15 @@ def _compile(function: ca.Function, place: Path | None) -> bool:
     if program is None or place is None:
         return False
     try:
-        place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if not private(place):
-            return False
-        with tempfile.TemporaryDirectory(dir=place) as folder:
-            source, library = Path(folder) / f"{function.name()}.c", Path(folder) / "library.so"
+        with made_apart(place) as folder:
+            if folder is None:
+                return False
+            source, library = folder / f"{function.name()}.c", folder / "library.so"
             source.write_text(loadable(function))
             command = [program, *_flags(function), "-o", str(library), str(source), "-lm"]
             # What the compiler itself leaves where it is interrupted goes with the folder.
-            subprocess.run(command, check=True, capture_output=True, env={**os.environ, "TMPDIR": folder})
-            os.replace(library, place / _named(_key(function), library.read_bytes()))
+            subprocess.run(command, check=True, capture_output=True, env={**os.environ, "TMPDIR": str(folder)})
+            os.replace(library, place / named(_key(function), library.read_bytes(), LIBRARY))
     except (OSError, subprocess.CalledProcessError):
         return False
     return True
@@ -196,13 +236,18 @@ _INTERPRETED = contextvars.ContextVar("interpreted", default=False)
 
 
 @contextlib.contextmanager
-def interpreted() -> Iterator[None]:
-    """Context manager within which nothing is compiled and no compiled function is loaded."""
-    token = _INTERPRETED.set(True)
+def switched_on(variable: contextvars.ContextVar[bool]) -> Iterator[None]:
+    """Context manager within which a variable is true."""
+    token = variable.set(True)
     try:
         yield
     finally:
-        _INTERPRETED.reset(token)
+        variable.reset(token)
+
+
+def interpreted() -> contextlib.AbstractContextManager[None]:
+    """Context manager within which nothing is compiled and no compiled function is loaded."""
+    return switched_on(_INTERPRETED)
 
 
 def chosen(function: ca.Function, calls: float, kernels: Kernels = "auto") -> ca.Function:

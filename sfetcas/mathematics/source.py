@@ -11,7 +11,7 @@ import numpy as np
 
 from .arrays import Array
 
-__all__ = ["functions_in_c", "loadable", "sizes_of", "table"]
+__all__ = ["functions_in_c", "in_lines", "loadable", "sizes_of", "table"]
 
 
 DEFINITION = re.compile(r"^(?:static )?(?:int|void|double|casadi_real|casadi_int|const \w+\*) (\w+)\(")
@@ -109,11 +109,11 @@ def table(name: str, values: Array, kind: str = "double") -> str:
     flat = np.asarray(values).ravel()
     texts = [_double(x) if kind == "double" else str(int(x)) for x in flat.tolist()] or ["0"]
     # There may be tens of thousands: without spaces.
-    inner = _lines(texts)
+    inner = in_lines(texts)
     return f"static const {kind} {name}[{len(texts)}] = {{\n{inner}\n}};\n"
 
 
-def _lines(texts: Sequence[str]) -> str:
+def in_lines(texts: Sequence[str]) -> str:
     """Constants with commas between them, in lines of at most 120 characters unless one is longer."""
     lines, line = [], ""
     for text in texts:

@@ -11,7 +11,6 @@ import functools
 import hashlib
 import io
 import os
-import tempfile
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,9 +19,8 @@ import casadi as ca
 import numpy as np
 
 from ..core.building import named
-from ..files import UnreadableError, read_file
 from .arrays import Array
-from .kernels import cache_folder, private
+from .kernels import cache_folder, made_apart, whole_files
 
 __all__ = ["KEPT", "NAMES", "Tape", "tape_of"]
 
@@ -50,8 +48,8 @@ KEPT = 256
 """Functions whose tapes are kept at hand: those of the kinds of terms of some models."""
 
 
-LONG, LARGEST = 10_000, 10_000_000
-"""Bytes of a serialised function from which on its tape is kept, and of a file that is looked at."""
+LONG = 10_000
+"""Bytes of a serialised function from which on its tape is kept."""
 
 SUFFIX = ".npz"
 
@@ -106,16 +104,15 @@ def tape_of(function: ca.Function) -> Tape | None:
 
 
 def _kept(folder: Path, key: str) -> Tape | None:
-    """The tape in a file of a folder whose name begins so, if it is whole and nobody else can have put it there."""
+    """The tape in a file of a folder whose name begins so, if there is one that is whole."""
     with contextlib.suppress(OSError):
-        for path in sorted(folder.glob(f"{key}*{SUFFIX}")) if private(folder) else ():
-            with contextlib.suppress(UnreadableError, ValueError, KeyError, zipfile.BadZipFile):
-                content = read_file(path, LARGEST)
-                if named(key, content, SUFFIX) == path.name:
-                    with np.load(io.BytesIO(content), allow_pickle=False) as parts:
-                        slots, arguments, results = parts["sizes"].tolist()
-                        where = tuple(parts["parts"].tolist())
-                        return Tape(parts["code"], parts["constant"], slots, arguments, results, where)
+        for _, content in whole_files(folder, key, SUFFIX):
+            # Named as by this program, but not of this form.
+            broken = contextlib.suppress(ValueError, KeyError, zipfile.BadZipFile)
+            with broken, np.load(io.BytesIO(content), allow_pickle=False) as parts:
+                slots, arguments, results = parts["sizes"].tolist()
+                where = tuple(parts["parts"].tolist())
+                return Tape(parts["code"], parts["constant"], slots, arguments, results, where)
     return None
 
 
@@ -123,14 +120,11 @@ def _keep(folder: Path, key: str, tape: Tape) -> None:
     """Put a tape into a folder, if that is possible, and take out the oldest ones that are too many."""
     content, sizes = io.BytesIO(), (tape.slots, tape.arguments, tape.results)
     np.savez(content, code=tape.code, constant=tape.constant, sizes=sizes, parts=tape.parts)
-    with contextlib.suppress(OSError):
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if not private(folder):
+    with contextlib.suppress(OSError), made_apart(folder) as place:
+        if place is None:
             return
-        with tempfile.TemporaryDirectory(dir=folder) as place:
-            made = Path(place) / "made"
-            made.write_bytes(content.getvalue())
-            os.replace(made, folder / named(key, content.getvalue(), SUFFIX))
+        (place / "made").write_bytes(content.getvalue())
+        os.replace(place / "made", folder / named(key, content.getvalue(), SUFFIX))
         for path in sorted(folder.glob(f"tape-*{SUFFIX}"), key=lambda path: path.stat().st_mtime)[:-FILES]:
             path.unlink(missing_ok=True)
 
