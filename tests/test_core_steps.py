@@ -16,7 +16,6 @@ from sfetcas import Scene, assemble, uniform_mesh
 from sfetcas.dynamics.beginning import at_rest
 from sfetcas.dynamics.integrating import Stepper
 from sfetcas.dynamics.stages import StageEquations
-from sfetcas.dynamics.steps import LAST_CHANGE
 from sfetcas.dynamics.taken import Memory
 from sfetcas.mathematics import core as c
 from sfetcas.mechanics.equations import Equations
@@ -44,9 +43,8 @@ def alike(memory, h, mine, other):
     if not np.isfinite(other["size"]).all():
         return
     assert mine["iterations"] == other["iterations"]
-    # Of steps so short that rounding over their square is what a last change comes from only that it is small.
-    rounding = 0.01 * LAST_CHANGE if h < 1e-4 else 1e-12
-    assert abs(mine["size"][0] - other["size"][0]) <= 1e-6 * other["size"][0] + rounding
+    # What is left of a last change may be rounding, which is that of unknowns.
+    assert abs(mine["size"][0] - other["size"][0]) <= 1e-6 * other["size"][0] + ROUNDING
     assert abs(mine["gap"][0] - other["gap"][0]) <= 1e-12 + ROUNDING * other["gap"][0]
     # Rates are changes over lengths of steps, and forces accelerations times masses: rounding of places, some 5e-15
     # as the function does not refine, is divided, and multiplied by numbers of the method, up to a hundred.
@@ -54,7 +52,11 @@ def alike(memory, h, mine, other):
     divided = {"rates": h ** -len(memory.rates), "rows": h**-2}
     for name in PARTS[:7]:
         size = max(1.0, float(np.abs(other[name]).max(initial=0.0)))
-        bound = ROUNDING * size + blurred * divided.get(name, 1.0)
+        rounded = blurred * divided.get(name, 1.0)
+        # Forces of a step so short that they are rounding for the most part hang on the processor.
+        if rounded > 0.1 * size:
+            continue
+        bound = ROUNDING * size + rounded
         assert np.abs(mine[name] - other[name]).max(initial=0.0) <= bound, name
 
 

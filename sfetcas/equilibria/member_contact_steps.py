@@ -25,8 +25,9 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model
 from ..solvers.continuation import between
+from ..solvers.guess import bends
 from ..solvers.prepared import Prepared, Solved
-from ..solvers.redundancy import redundant
+from ..solvers.redundancy import loose_rows, redundant
 from .force_balance import refuse_lost_forces
 from .meshing import Meshing
 from .refinement import LEVELS, MOST_ELEMENTS, Refinement
@@ -47,6 +48,9 @@ SHARES = (1.0, 1e-2, 1e-4)
 """Shares of small loads: what is straight between ends that come nearer moves aside by the root of them, and shall not
 yet touch.
 """
+
+BENT_OFF = (1.0, 0.3, 0.1, 0.03, 0.01)
+"""Shares of loads under which straight members on obstacles are pushed together and come to rest beside these."""
 
 POINTED = 0.1
 """Rotation, over the accuracy, up to which a short line is taken for a point."""
@@ -109,6 +113,34 @@ class MemberContactSteps:
                 return bent
         return None
 
+    def _bent_off(self, pilot: Prepared, factor: float, zero: Solved) -> Solved | None:
+        """Where straight members on obstacles that are pushed together come to rest, bent off these before; None where
+        they are not pushed together, or not bent off.
+
+        The share of the factor is the largest at which members need not turn far.  From zero they could be followed in
+        the smallest steps only: their thrust begins there with infinity.
+        """
+        if self.scene.rubs or not (self.run.leaves and pilot.model.minimisable and pilot.lacks_slack):
+            return None
+        equations = pilot.equations
+        loose = loose_rows(equations, zero.point)
+        for share in BENT_OFF:
+            way = on_way(0.0, share * factor, 1.0)
+            loading = way(pilot.model)
+            gaps = equations.at(zero.state, loading).residual[equations.unknowns :]
+            if np.abs(loose.T @ gaps).max() <= tolerances.CLOSED:
+                return None
+            bent = [
+                Solved.taken(pilot, closed, loading)
+                for _, closed, gap in bends(equations, zero.state, loading, pilot.weight)
+                if gap <= tolerances.REACHED
+            ]
+            off = [one for one in bent if self.run.near(zero, one, NEAR) and self.run.clear(one.fields)]
+            if off:
+                lowest = min(off, key=lambda one: one.point.potential)
+                return self.run.relaxed(pilot.model.mesh, lowest, way)
+        return None
+
     def _alone(self, pilot: Prepared, factor: float, zero: Solved) -> Equilibrium | None:
         """The answer in which nothing touches, where the growing loads lead there; else None."""
         # What has no place without loads may be led through other members before they are looked at.
@@ -137,6 +169,8 @@ class MemberContactSteps:
         begin, start = 0.0, self.run.lying(zero)
         if self.last is not None and self.last[0] * (factor - self.last[0]) >= 0.0:
             begin, start = self.last
+        elif start is not zero and (off := self._bent_off(pilot, factor, zero)) is not None:
+            begin, start = off.factor, off
         elif pilot.model.standing or any(pilot.model.factors(0.0).values()):
             # What acts already without the factor.
             found = self.run.follow(lambda t: lambda model: model.loading(0.0, t), start)
@@ -149,7 +183,8 @@ class MemberContactSteps:
                 begin = SMALL * factor
                 start = self._known(self.run.relaxed(pilot.model.mesh, zero, lambda model: model.loading(begin)))
         notes: tuple[str, ...] = ()
-        for a, b in itertools.pairwise(stops_between(self.scene, begin, factor)):
+        stops = stops_between(self.scene, begin, factor) if begin != factor else []
+        for a, b in itertools.pairwise(stops):
             start = self._known(self.run.follow(partial(on_way, a, b), start))
             notes += self.run.notes(a, b)
         return start, notes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..mechanics.rotations import RotationFreedom
 from .newton import TURN, Iterate, Moving, descend, newton
 from .redundancy import loose_rows
 
-__all__ = ["first_guess", "lacks_slack", "lead", "restore"]
+__all__ = ["bends", "first_guess", "lacks_slack", "lead", "restore"]
 
 LEADING, SETTLING = 30, 10
 """Steps in which the targets of nodes move to their start places, and further steps with the targets at rest."""
@@ -237,14 +238,22 @@ def _carried(equations: Equations, loading: Loading) -> State:
 
 def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -> State:
     """Straight members bent slightly, each by itself or chains as a whole, to the side of least potential."""
-    sides = []
+    sides = [
+        (gap, equations.at(closed, loading).potential, bent)
+        for bent, closed, gap in bends(equations, state, loading, weight)
+    ]
+    return _least(sides)[2]
+
+
+def bends(equations: Equations, state: State, loading: Loading, weight: Array) -> Iterator[tuple[State, State, float]]:
+    """A state with straight members bent slightly, each by itself or chains as a whole, to either side; with each what
+    :func:`restore` makes of it, and the gap that is left.
+    """
     for vectors in (_bow(equations), _tent(equations)):
         share = _fitting(equations, state, loading, vectors)
         for sign in (share, -share):
             bent = replace(state, q=_turned_by(equations, state, sign * vectors))
-            closed, gap = restore(equations, bent, loading, weight)
-            sides.append((gap, equations.at(closed, loading).potential, bent))
-    return _least(sides)[2]
+            yield bent, *restore(equations, bent, loading, weight)
 
 
 def _fitting(equations: Equations, state: State, loading: Loading, vectors: Array) -> float:
