@@ -142,7 +142,8 @@ def _made(
         made = time_step(scene, name, results=results, places=places, **given)
         writer = StepWriter(made)
     else:
-        made = equilibrium_solver(scene, name, results=results, places=places, touching=True, watched=True, **given)
+        given |= {"stopped": scene.stopped, "touching": True, "watched": True}
+        made = equilibrium_solver(scene, name, results=results, places=places, **given)
         writer = EquilibriumWriter(made, sensitivities=sensitivities)
     return made, writer.files()
 

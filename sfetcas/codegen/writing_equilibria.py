@@ -10,7 +10,6 @@ import numpy as np
 
 from ..description.records import counted
 from ..parametric.equilibrium import EquilibriumSolver
-from ..parametric.watching import LEAST
 from ..solvers.globalised import MEANINGS, Code
 from .core_in_c import SolverTables, core_in_c
 from .rendering import Status, Writer, defined, filled, row, rows, template
@@ -106,7 +105,7 @@ class EquilibriumWriter(Writer):
     @property
     def tables(self) -> list[str]:
         """The core, ranges of arguments, and all that it takes of the model."""
-        constants = self._tables.constants | {"MARGINS": self._margins, "LEAST": LEAST}
+        constants = self._tables.constants | {"MARGINS": self._margins}
         return [*core_in_c("afar.c"), defined(constants), *self.ranges, *self._tables.texts]
 
     @property

@@ -255,9 +255,14 @@ class Equations:
     def state(self, flat: Array) -> State:
         """The state of a vector (states,): rotations, displacements, multipliers, values near which angles count."""
         count, components = len(self.model.rotations.kind), self.model.element.components
-        sizes = [count * components, self.displacement_unknowns, self.rows]
-        q, y, lam, unwrapped = np.split(flat, np.cumsum(sizes))
+        q, y, lam, unwrapped = np.split(flat, self.parts)
         return State(q.reshape(count, components), y, lam, unwrapped)
+
+    @property
+    def parts(self) -> list[int]:
+        """Where displacements, multipliers, and values near which angles count begin in the vector of a state."""
+        count, components = len(self.model.rotations.kind), self.model.element.components
+        return np.cumsum([count * components, self.displacement_unknowns, self.rows]).tolist()
 
     def start(self, loading: Loading) -> State:
         """The undeformed state, with prescribed rotations at their values."""

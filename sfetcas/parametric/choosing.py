@@ -20,32 +20,15 @@ from ..mathematics.arrays import Array
 from ..mechanics.fields import transferred
 from ..mechanics.model import Model, assemble
 from ..mechanics.unilateral import Stops, Unilateral, unilaterals
-from .arguments import Arguments, refuse_idle
+from .arguments import Arguments
 from .equilibrium import EquilibriumSolver
 from .results import Results
+from .watching import Gauge, gauges_of, refuse_idle_in_all, stop_margins_of
 
 __all__ = ["Choosing"]
 
 STRICT = 1e-7
 """Margins, dimensionless, that are as small leave it to a change of a number to which side of a change it leads."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Gauge:
-    """A model in which constraints are active, for the residuals of their rows.
-
-    Attributes
-    ----------
-    arguments : Arguments
-    prepare : Function
-        (arguments) -> given.
-    gaps : Function
-        (state, given) -> residuals of all rows.
-    """
-
-    arguments: Arguments
-    prepare: ca.Function
-    gaps: ca.Function
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +45,7 @@ class Choosing:
 
     first: EquilibriumSolver
     equilibria: dict[Stops, Any] = field(default_factory=dict)
+    _margins: dict[Stops, ca.Function] = field(default_factory=dict)
 
     @functools.cached_property
     def constraints(self) -> tuple[Unilateral, ...]:
@@ -97,53 +81,20 @@ class Choosing:
 
     def margins(self, solver: EquilibriumSolver, numbers: Array, flat: Array) -> Mapping[Unilateral, float]:
         """The margin of each constraint, dimensionless, at an equilibrium for numbers (numbers,)."""
-        model, state = solver.model, solver.arguments.program.equations.state(flat)
-        stops, found = model.mesh.stops, dict[Unilateral, float]()
-        gaps = {side: self._gaps(side, model, numbers, state) for side in self._sides}
-        for one in self.constraints:
-            if one.active(stops):
-                multiplier = float(state.lam[model.row_names.index(_row(one))])
-                found[one] = -multiplier if one.side == "low" else multiplier
-            else:
-                beyond = gaps["low" if one.side == "low" else self._sides[-1]][_row(one)]
-                found[one] = beyond if one.side == "low" else -beyond
-        return found
-
-    @property
-    def _sides(self) -> tuple[str, ...]:
-        """Which stops are active in the models that tell gaps, beside all tendons."""
-        return ("low", "high") if any(one.table == "springs" for one in self.constraints) else ("low",)
-
-    def _gaps(self, side: str, model: Model, numbers: Array, state: object) -> dict[str, float]:
-        gauge = self._gauges[side]
-        there = transferred(model, state, gauge.arguments.model)  # type: ignore[arg-type]
-        residual = np.array(gauge.gaps(there.flat, gauge.prepare(numbers))).ravel()
-        return dict(zip(gauge.arguments.model.row_names, residual.tolist(), strict=True))
+        stops = solver.model.mesh.stops
+        if stops not in self._margins:
+            self._margins[stops] = stop_margins_of("margins", solver.model, solver.arguments, self._gauges)
+        found = np.array(self._margins[stops](numbers, flat, solver.prepare(numbers))).ravel()
+        return dict(zip(self.constraints, found.tolist(), strict=True))
 
     @functools.cached_property
-    def _gauges(self) -> dict[str, _Gauge]:
-        found = {}
-        for side in self._sides:
-            stops = tuple(one.entry for one in self.constraints if one.side == side)
-            base, first = self._assembled(stops), self.first
-            results = Results(base, [], {}, unique=first.unique)
-            arguments = Arguments(first.scene, base, first.arguments.arguments, results, needed=False)
-            program = arguments.program
-            rows = ca.densify(program.forces.residual[program.equations.unknowns :])
-            gaps = ca.Function("gaps", [program.state_symbol, program.symbol], [rows])
-            found[side] = _Gauge(arguments, arguments.prepare("prepare"), gaps)
-        return found
+    def _gauges(self) -> dict[str, Gauge]:
+        first = self.first
+        return gauges_of(first.model, first.arguments.arguments, unique=first.unique)
 
     def check(self) -> None:
-        """Refuse numbers on which nothing depends, whatever is taut and at a stop.
-
-        Raises
-        ------
-        SceneError
-            Names the first.
-        """
-        others = [gauge.arguments.idle for gauge in self._gauges.values()]
-        refuse_idle([name for name in self.first.arguments.idle if all(name in idle for idle in others)])
+        """Refuse numbers on which nothing depends, see :func:`~sfetcas.parametric.watching.refuse_idle_in_all`."""
+        refuse_idle_in_all(self.first.arguments, self._gauges)
 
     def refuse_doubt(self, solver: EquilibriumSolver, numbers: Array, flat: Array) -> None:
         """Refuse derivatives where they differ to the sides of a change.
@@ -158,8 +109,3 @@ class Choosing:
             if margin <= STRICT:
                 detail = f"{one.becomes(stops)} there, and derivatives differ to either side"
                 raise SolveError(Status.KINK, detail)
-
-
-def _row(one: Unilateral) -> str:
-    """Name of the row of a constraint where it is active."""
-    return f"{one.table}.{one.name}" + (".stop" if one.table == "springs" else "")

@@ -31,7 +31,7 @@ from ..solvers.globalised import MEANINGS, NOT_DEFINED, Code, Globalised, Outcom
 from ..solvers.prepared import Prepared, Solved
 from .arguments import Arguments, Asked, asked_for, in_words
 from .results import Results, default_results
-from .watching import LEAST, margins_of
+from .watching import watched_of
 
 __all__ = [
     "SOLVED",
@@ -75,7 +75,7 @@ class EquilibriumSolver:
     answer : Equilibrium
         The static answer for the last step of the scene on a finer mesh, by which the accuracy was checked.
     margins : Function or None
-        Of a scene with contacts what is looked at, see :func:`~sfetcas.parametric.watching.margins_of`.
+        Of a scene with contacts or stops what is looked at, see :func:`~sfetcas.parametric.watching.watched_of`.
     begun : ndarray (numbers,) or None
         Where something touches the arguments of which ``start`` is the equilibrium.
     """
@@ -205,7 +205,7 @@ class EquilibriumSolver:
             outputs = nothing
         if not np.isfinite(outputs).all():
             return replace(outcome, code=Code.NOT_FINITE, negative=NOT_DEFINED), nothing
-        if self.margins is not None and not np.array(self.margins(p, outcome.state, given)).min(initial=0.0) >= LEAST:
+        if self.margins is not None and not np.array(self.margins(p, outcome.state, given)).min(initial=0.0) >= 0.0:
             return replace(outcome, code=Code.TOUCHES, negative=NOT_DEFINED), nothing
         return replace(outcome, error=float(self.error(outcome.state, given))), outputs
 
@@ -320,14 +320,15 @@ def equilibrium_solver(
         # Straight members without slack bend to no side by themselves; a start chooses one.
         start = prepared.guess(base.loading(scene.analysis.steps[-1]))[0].flat
     rules = Rules() if scene.analysis.unstable == "leave" else replace(Rules(), escapes=0)
-    margins = margins_of(f"{name}_margins", base, known.arguments) if watched and scene.contacts else None
+    margins = watched_of(f"{name}_margins", base, known) if watched else None
     solver = EquilibriumSolver(name, scene, known, outputs, rules, start, answer, margins)
     if mesh.points:
         # What touches does so near its answer alone.
         begun = in_contact(kept_of(scene, settings or Settings(), solved_from(answer)), solver.model)
         solver = replace(solver, start=begun.flat, begun=known.defaults)
         return _found(solver) if watched else solver
-    return solver if start is not None or _same(solver) else replace(solver, start=_answered(solver))
+    solver = solver if start is not None or _same(solver) else replace(solver, start=_answered(solver))
+    return _found(solver) if watched and scene.stopped else solver
 
 
 def _found(solver: EquilibriumSolver) -> EquilibriumSolver:

@@ -84,7 +84,7 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
   if (status <= @NAME@_UNSTABLE) {
     sf_call(m, @name@_margins, arguments, own, m->given, m->margins);
     for (i = 0; i < SF_MARGINS; ++i)
-      if (!(m->margins[i] >= SF_LEAST)) status = @NAME@_TOUCHES;
+      if (!(m->margins[i] >= 0.0)) status = @NAME@_TOUCHES;
     if (results && status == @NAME@_TOUCHES) sf_none(results, @NAME@_RESULTS);
   }
 #endif
