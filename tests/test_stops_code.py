@@ -148,6 +148,6 @@ def test_c_has_the_bits_of_the_process(tmp_path):
 
 def test_what_is_not_found_for_the_arguments_of_the_scene_is_not_written(monkeypatch, tmp_path):
     monkeypatch.setattr(importlib.import_module("sfetcas.parametric.watching"), "BEYOND", 1.0)
-    with pytest.raises(SolveError, match=r"says for the arguments of the scene: .*: other things do"):
+    with pytest.raises(SolveError, match=r"says for the arguments of the scene: .*: others are"):
         export(made(lever([1.0])), tmp_path / "lever")
     assert not list(tmp_path.iterdir())
