@@ -17,6 +17,7 @@ from ..contact.pressing import pressed, push_at
 from ..description.answers import MOTION
 from ..description.records import counted, plain, say
 from ..description.showing import error_in_words, notes_in_words, number_in_words, shown
+from ..equilibria.quantities import WHERE, Quantity
 from ..equilibria.solution import Configuration, heading, heading_in_words
 from ..errors import SceneError, Status
 from ..mathematics.arrays import Array
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     from .inertia import Inertia
     from .sampling import Sample, StepRecord
 
-__all__ = ["MotionState", "Mover", "StopEvent", "Trajectory"]
+__all__ = ["MotionState", "Mover", "StopEvent", "Trajectory", "apart_in"]
 
 
 class Mover:
@@ -367,6 +368,27 @@ BETWEEN = "touch each other", "hit and leave each other", "leave each other"
 """What members do to each other."""
 
 
+def apart_in(
+    quantity: Quantity, coarse: Sequence[MotionState], fine: Sequence[MotionState], where: tuple[str, ...] = WHERE
+) -> float:
+    """How far two runs are apart in a quantity at any time, over its largest value.
+
+    Raises
+    ------
+    SceneError
+        It does not consist of numbers; it was named at ``where``.
+    """
+    own, apart = list[Array](), 0.0
+    try:
+        for one, other in zip(coarse, fine, strict=False):
+            a, b = quantity.value(one), quantity.value(other)
+            own.append(b)
+            apart = max(apart, quantity.apart(a, b) if one.time == other.time else 0.0)
+    except SceneError as error:
+        raise SceneError(str(error), where) from None
+    return apart / quantity.unit(fine[0], own)
+
+
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """The answer of a dynamic analysis: the motion of a scene in time.
@@ -398,6 +420,8 @@ class Trajectory:
         The time steps of the integrator, which :meth:`between` and :meth:`resampled` interpolate; None of ``idas``.
     events : tuple of StopEvent
         When tendons became taut or slack, and stops of springs and obstacles were reached or left, as time goes on.
+    coarser : tuple of MotionState
+        The answers of the run before the last one, with longer steps on a coarser mesh; empty where there is none.
     """
 
     scene: Any = field(repr=False)
@@ -413,6 +437,7 @@ class Trajectory:
     failure: str = ""
     record: StepRecord | None = field(repr=False, default=None)
     events: tuple[StopEvent, ...] = field(repr=False, default=())
+    coarser: tuple[MotionState, ...] = field(repr=False, default=())
 
     def __repr__(self) -> str:
         answers = f"{counted(len(self.steps), 'answer')} from {self.steps[0].time:g} to {self.last.time:g} s"
@@ -439,6 +464,33 @@ class Trajectory:
     def times(self) -> Array:
         """Times of the answer, s."""
         return np.array([step.time for step in self.steps])
+
+    @single_threaded
+    def error_in(self, name: str) -> float | None:
+        """Estimated error of any quantity, as reactions and section forces, over its largest value in the motion.
+
+        It is the largest difference of the last two runs over all times of the answer, which is about the error of the
+        first of them: nothing is taken off for the order by which the errors of positions fall.  Forces that jump, as
+        those of impacts and of stops that are reached, differ by their size where the two runs jump at other times.
+
+        Parameters
+        ----------
+        name : str
+            ``reactions.pin.force``, ``members.beam.moment at 0.5``; lengths are over the size of the scene, angles in
+            rad, see ``accuracy_of`` of an analysis, by which a motion is found to the accuracy of one quantity.
+
+        Returns
+        -------
+        float or None
+            None where there was one run, as with a prescribed step or mesh.
+
+        Raises
+        ------
+        SceneError
+            There is no such quantity, or it does not consist of numbers.
+        """
+        quantity = Quantity.named(name, self.scene, ("name",))
+        return apart_in(quantity, self.coarser, self.steps, ("name",)) if self.coarser else None
 
     def at(self, time: float) -> MotionState:
         """The state of the answer whose time is nearest to a time in s; nothing is interpolated."""

@@ -17,8 +17,7 @@ from ..contact.closest import Closest
 from ..contact.pairs import Near, PairKey
 from ..description.scene import Scene
 from ..description.sections import HEAVY
-from ..equilibria.meshing import WHERE, Meshing
-from ..equilibria.quantities import Quantity
+from ..equilibria.meshing import Meshing
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium, superelement_notes, touched_notes
 from ..errors import LIMITS, SceneError, SolveError, Status
@@ -43,7 +42,7 @@ from .inertialess import check_balanced, check_resisted
 from .integrating import SHORTEST
 from .integrators import InitialState, Integrator, Stages, TimeGrid
 from .methods import GeneralisedAlpha, Radau
-from .motion import MotionState, Mover, StopEvent, Trajectory
+from .motion import MotionState, Mover, StopEvent, Trajectory, apart_in
 from .sampling import StepRecord
 from .shaping import shaped, stretched
 from .stages import StageEquations
@@ -372,7 +371,7 @@ class Simulation:
     def motion(self) -> Trajectory:
         """The answer: runs on finer and finer discretisations until two agree to the accuracy."""
         analysis = self.scene.analysis
-        mesh, error = self.mesh, None
+        mesh, error, coarser = self.mesh, None, None
         if self.scene.contacts and analysis.initial == "equilibrium":
             entries = (entry for name in self.scene.obstacles for entry in self.before.touched(name))
             mesh = ending_at(self.scene, mesh, ((e["member"], at) for e in entries for at in np.atleast_1d(e["at"])))
@@ -406,7 +405,7 @@ class Simulation:
                     run.failure = SolveError(why.status, f"{why.detail}; {ON_COARSER}", why.last)
                 break
             before = apart
-            apart, run = self._difference(run, finer), finer
+            apart, coarser, run = self._difference(run, finer), run, finer
             # Fronts that cross elements, and instants of yield within steps, leave no order by which errors fall.
             error = apart if self.scene.remembers else left(apart, before, self.accuracy)
             error = max(error, self._deepest(run))
@@ -414,7 +413,7 @@ class Simulation:
                 break
         if error is not None and apart is not None and error > max(self.accuracy, apart, self._deepest(run)):
             run.notes = (*run.notes, SENSITIVE)
-        return self._answer(run, error)
+        return self._answer(run, error, () if coarser is None else tuple(coarser.instants))
 
     def _without_dips(self, mesh: Mesh, run: MeshRun) -> Mesh:
         """A mesh whose elements are halved where members dip into obstacles, and end at round ones where they do."""
@@ -439,7 +438,7 @@ class Simulation:
     def _difference(self, coarse: MeshRun, fine: MeshRun) -> float:
         """How far runs are apart: distances of nodes and middles of members, over the size of the scene."""
         if self.quantity is not None:
-            return self._difference_of(self.quantity, coarse, fine)
+            return apart_in(self.quantity, coarse.instants, fine.instants)
         scene, apart = self.scene, 0.0
         turning = coarse.instants[0].model.rotations.node_turn
         arms = {name: self._arm(coarse, name) for name in scene.nodes if turning[name] is not None}
@@ -462,19 +461,6 @@ class Simulation:
                 apart = max(apart, float(np.abs(moved).max()))
         return apart / scene.size
 
-    def _difference_of(self, quantity: Quantity, coarse: MeshRun, fine: MeshRun) -> float:
-        """How far runs are apart in a quantity, over its largest value."""
-        own: list[Array] = []
-        apart = 0.0
-        try:
-            for one, other in zip(coarse.instants, fine.instants, strict=False):
-                a, b = quantity.value(one), quantity.value(other)
-                own.append(b)
-                apart = max(apart, quantity.apart(a, b) if one.time == other.time else 0.0)
-        except SceneError as error:
-            raise SceneError(str(error), WHERE) from None
-        return apart / quantity.unit(fine.instants[0], own)
-
     @staticmethod
     def _arm(run: MeshRun, name: str) -> float:
         """Arm, m, on which all mass would have the rotary inertia of what turns like a node: what its angle counts."""
@@ -483,7 +469,7 @@ class Simulation:
         shares = [np.abs(group.mass).sum() for group in system.masses.observables if turn in group.turns]
         return float(np.sqrt(sum(shares) / system.axes)) * mover.model.scales.length
 
-    def _answer(self, run: MeshRun, error: float | None) -> Trajectory:
+    def _answer(self, run: MeshRun, error: float | None, coarser: tuple[MotionState, ...]) -> Trajectory:
         short = error is not None and not error <= self.accuracy and self.asked
         status = Status.SHORT if short else Status.SOLVED
         if run.failure is not None:
@@ -511,6 +497,7 @@ class Simulation:
             failure="" if run.failure is None else run.failure.detail,
             record=run.record,
             events=run.events,
+            coarser=coarser,
         )
         if run.failure is not None:
             if motion.steps:

@@ -20,7 +20,7 @@ from .quantities import WHERE, Quantity
 from .settings import Settings
 from .solution import Equilibrium
 
-__all__ = ["PILOT_ELEMENTS", "WHERE", "EquilibriumResult", "Meshing"]
+__all__ = ["PILOT_ELEMENTS", "EquilibriumResult", "Meshing"]
 
 FINE = 1e-8
 """Below this accuracy elements of order 6 need fewer unknowns than those of order 4 (measured)."""

@@ -93,25 +93,25 @@ class Quantity:
     name: AnswerName
 
     @classmethod
-    def named(cls, text: str, scene: Scene) -> Quantity:
+    def named(cls, text: str, scene: Scene, where: tuple[str, ...] = WHERE) -> Quantity:
         """The quantity of a name; along members with a place: ``members.beam.moment at 0.5``.
 
         Raises
         ------
         SceneError
-            There is no such quantity, or it is one along a member and the place is missing.
+            There is no such quantity, or it is one along a member and the place is missing; ``where`` it was given.
         """
-        name = answer_name(text, *WHERE)
+        name = answer_name(text, *where)
         try:
             check_answer(scene, name)
         except SceneError as error:
-            raise SceneError(error.bare, WHERE) from None
+            raise SceneError(error.bare, where) from None
         tables = sorted({kind.table for kind in ANSWERS if kind.key and (kind.named or MOTION in kind.where)} - {""})
         if name.kind.table not in tables:
-            raise SceneError(f"found {text!r}, accepted: a quantity of {', '.join(tables)}", WHERE)
+            raise SceneError(f"found {text!r}, accepted: a quantity of {', '.join(tables)}", where)
         if name.kind.along != (name.at is not None) or len(name.selectors) > name.kind.along:
             accepted = f"{name.bare} at 0.5, or another place" if name.kind.along else name.bare
-            raise SceneError(f"found {text!r}, accepted: {accepted}", WHERE)
+            raise SceneError(f"found {text!r}, accepted: {accepted}", where)
         return cls(name)
 
     @property
