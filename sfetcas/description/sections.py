@@ -156,6 +156,8 @@ def _coefficients(varying: Quantity, left: float, right: float) -> Floats:
 
 def _lowest(varying: Quantity, less: Quantity = 0.0) -> tuple[float, float]:
     """Fraction and value of the minimum of varying - less on [0, 1]; rounding below zero counts as zero."""
+    if isinstance(varying, float) and isinstance(less, float):
+        return 0.0, varying - less
     if isinstance(varying, Formula) or isinstance(less, Formula):
         return _least(varying, less)
     edges = sorted({0.0, *breaks(varying), *breaks(less), 1.0})

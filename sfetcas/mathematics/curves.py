@@ -98,12 +98,14 @@ class Screw(Curve):
         return multiply(np.column_stack([real, np.outer(imaginary, self.axis)]), self.first)
 
     def curvatures(self, x: Floats) -> Floats:
+        if not self.turns:
+            return np.zeros((len(x), 3))
         constant = rotate(conjugate(self.first), 2.0 * math.pi * self.turns * self.axis)
         return np.tile(constant, (len(x), 1))
 
     @property
     def samples(self) -> Floats:
-        return np.linspace(0.0, 1.0, 9)
+        return np.linspace(0.0, 1.0, 9 if self.turns else 2)
 
     @property
     def turning(self) -> float:
