@@ -1318,6 +1318,18 @@ def test_straight_strip_that_is_pushed_together_rises_in_a_hump(push):
     assert found.reaction("B")[0][0] == pytest.approx(-(k**2), rel=2.0 * steep)
 
 
+@pytest.mark.parametrize(("push", "lift"), [(0.6, 0.0), (1.0, 0.1)])
+def test_strip_that_is_pushed_together_by_much_bulges(push, lift):
+    found = solve(made(pushed_together(push, lift)), accuracy=1e-6).last
+    assert found.certificate.stable
+    assert not found.notes
+    # Nothing is below the floor by more than the accuracy of positions, of 3 m, and all is held.
+    assert smallest_gap(found) > -1e-6 * 3.0
+    up = found.contacts["floor"]["force"][1] + found.reaction("A")[0][1] + found.reaction("B")[0][1]
+    # Ten times the accuracy, times the loads.
+    assert up == pytest.approx(12.0, abs=1e-5 * 12.0)
+
+
 @pytest.mark.parametrize("steps", [[0.5, 1.0], [1.0, 0.1]])
 def test_strip_that_is_pushed_together_and_lifted_does_not_hang_on_its_first_step(steps):
     scene = made(pushed_together(0.1, 0.5))

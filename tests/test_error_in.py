@@ -58,6 +58,7 @@ def test_one_run_has_none():
     [
         ("reactions.Z.force", "found 'Z', accepted: A, B"),
         ("members.rod.moment", "accepted: members.rod.moment at 0.5, or another place"),
+        ("members.rod.moment at 2", "found 2"),
         ("certificate.stable", "told of statics only"),
     ],
 )
@@ -66,3 +67,18 @@ def test_wrong_names_are_refused(name, sentence):
     with pytest.raises(sfetcas.SceneError, match="name: ") as caught:
         motion.error_in(name)
     assert sentence in str(caught.value)
+
+
+def test_ends_that_differ_are_compared():
+    """With `until` the two runs end at times that differ, and here have no other common time but the begin."""
+    table = sfetcas.load(PROBLEMS / "pendulums_rigid.toml").replace({"expect": ()})
+    until = {"quantity": "nodes.B3.position", "component": 1, "below": 0.5}
+    given = {"type": "dynamic", "end": 2.0, "output": 2.0, "until": until, "accuracy": 1e-3}
+    motion = sfetcas.solve(table.replace({"analysis": given}))
+    assert motion.last.time < 2.0
+    one, two = motion.coarser[-1], motion.last
+    assert one.time != two.time
+    apart = abs(one.reaction("A3")[0] - two.reaction("A3")[0]).max()
+    largest = max(abs(step.reaction("A3")[0]).max() for step in motion.steps)
+    # Norms of vectors and their largest components differ by the root of three at most.
+    assert motion.error_in("reactions.A3.force") >= apart / largest / 3.0**0.5 > 1e-9

@@ -114,6 +114,9 @@ def test_a_place_of_a_stop_may_be_an_argument():
         assert solver.by_name(results)["nodes.B.position"] == pytest.approx(wanted, abs=1e-7)
     # The free lever would turn by 1.06 rad.
     assert solver.solve(np.array([1.5]))[0].code is Code.TOUCHES
+    # Zero is between the sides of a stop, and that of an angle is an angle.
+    assert solver.solve(np.array([-0.1]))[0].code is Code.BAD_ARGUMENT
+    assert [one.unit for one in solver.arguments.arguments] == ["rad"]
 
 
 def test_a_number_on_which_nothing_depends_is_refused():

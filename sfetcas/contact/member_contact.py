@@ -155,6 +155,9 @@ so short a step a state that goes on turns by less than a fifth of that.
 MOST_FALLS = 12
 """Unstable states on a way that are left, and ends of branches, at most."""
 
+CREEPS = 3
+"""Ends of branches from which a way leads on by one of its shortest steps only, at most: it would do so for ever."""
+
 BESIDE = "an unstable equilibrium is beside the way: what is a little imperfect may go to its other side"
 """What a note says where the way goes on that comes near to another branch."""
 
@@ -930,7 +933,7 @@ class MemberContact:
         self.stood = False
         unstable: _Step | None = None
         self.patient = False
-        now, step, left, pace = _Step(0.0, start), self.first, -1.0, 0.0
+        now, step, left, pace, little = _Step(0.0, start), self.first, -1.0, 0.0, 0
         # In space what is driven by a whole turn looks as if it were not.
         turn = way(1.0)(start.model).plus(way(0.0)(start.model).scaled(-1.0)).turned if start.model.space else 0.0
         while now.part < 1.0:
@@ -966,6 +969,9 @@ class MemberContact:
                 step, self.lines.keys = (0.5 if now.part > 0.0 else SOONER) * (part - now.part), lines
                 if there is None and step < narrow and left < now.part:
                     # Where a branch of equilibria ends what moves on comes to rest on another one.
+                    little += part - now.part < narrow
+                    if little > CREEPS:
+                        return None
                     left, there = now.part, self._fallen_from(mesh, now, part, way(part))
                     now, step = (now, step) if there is None else (_Step(part, there), self.first)
                     mesh = mesh if there is None else replace(there.model.mesh, points=())

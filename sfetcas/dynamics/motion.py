@@ -379,11 +379,14 @@ def apart_in(
         It does not consist of numbers; it was named at ``where``.
     """
     own, apart = list[Array](), 0.0
+    # What ends at a condition ends at times that differ a little: both ends are compared.
+    ends = [] if coarse[-1].time == fine[-1].time else [(coarse[-1], fine[-1])]
+    pairs = [(one, other) for one, other in zip(coarse, fine, strict=False) if one.time == other.time]
     try:
-        for one, other in zip(coarse, fine, strict=False):
+        for one, other in (*pairs, *ends):
             a, b = quantity.value(one), quantity.value(other)
             own.append(b)
-            apart = max(apart, quantity.apart(a, b) if one.time == other.time else 0.0)
+            apart = max(apart, quantity.apart(a, b))
     except SceneError as error:
         raise SceneError(str(error), where) from None
     return apart / quantity.unit(fine[0], own)
@@ -473,6 +476,8 @@ class Trajectory:
         first of them: nothing is taken off for the order by which the errors of positions fall.  Forces that jump, as
         those of impacts and of stops that are reached, differ by their size where the two runs jump at other times.
 
+        Of what is nothing but rounding, as forces at free ends, it says nothing.
+
         Parameters
         ----------
         name : str
@@ -490,7 +495,10 @@ class Trajectory:
             There is no such quantity, or it does not consist of numbers.
         """
         quantity = Quantity.named(name, self.scene, ("name",))
-        return apart_in(quantity, self.coarser, self.steps, ("name",)) if self.coarser else None
+        # With one run it is nevertheless looked whether there is such a quantity.
+        runs = (self.coarser, self.steps) if self.coarser else (self.steps[-1:], self.steps[-1:])
+        apart = apart_in(quantity, *runs, ("name",))
+        return apart if self.coarser else None
 
     def at(self, time: float) -> MotionState:
         """The state of the answer whose time is nearest to a time in s; nothing is interpolated."""

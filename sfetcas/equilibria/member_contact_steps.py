@@ -49,8 +49,11 @@ SHARES = (1.0, 1e-2, 1e-4)
 yet touch.
 """
 
-BENT_OFF = (1.0, 0.3, 0.1, 0.03, 0.01)
-"""Shares of loads under which straight members on obstacles are pushed together and come to rest beside these."""
+BENT_OFF, OFF, ASIDE = (1.0, 0.3, 0.1, 0.03, 0.01), 1.5, 0.5
+"""Shares of loads under which straight members on obstacles are pushed together and come to rest beside these; by how
+much they may be bent, rad, as beyond they may have swung through something; and by how much more at one end, as a hump
+in the middle would be in balance between its two ways down.
+"""
 
 POINTED = 0.1
 """Rotation, over the accuracy, up to which a short line is taken for a point."""
@@ -113,9 +116,9 @@ class MemberContactSteps:
                 return bent
         return None
 
-    def _bent_off(self, pilot: Prepared, factor: float, zero: Solved) -> Solved | None:
-        """Where straight members on obstacles that are pushed together come to rest, bent off these before; None where
-        they are not pushed together, or not bent off.
+    def _bent_off(self, pilot: Prepared, factor: float, zero: Solved) -> tuple[float, Solved] | None:
+        """Factor and state at which straight members on obstacles that are pushed together come to rest, bent off these
+        before; None where they are not pushed together, or not bent off.
 
         The share of the factor is the largest at which members need not turn far.  From zero they could be followed in
         the smallest steps only: their thrust begins there with infinity.
@@ -130,15 +133,17 @@ class MemberContactSteps:
             gaps = equations.at(zero.state, loading).residual[equations.unknowns :]
             if np.abs(loose.T @ gaps).max() <= tolerances.CLOSED:
                 return None
-            bent = [
-                Solved.taken(pilot, closed, loading)
-                for _, closed, gap in bends(equations, zero.state, loading, pilot.weight)
-                if gap <= tolerances.REACHED
-            ]
-            off = [one for one in bent if self.run.near(zero, one, NEAR) and self.run.clear(one.fields)]
-            if off:
-                lowest = min(off, key=lambda one: one.point.potential)
-                return self.run.relaxed(pilot.model.mesh, lowest, way)
+            for aside in (ASIDE, 0.0):
+                bent = [
+                    Solved.taken(pilot, closed, loading)
+                    for _, closed, gap in bends(equations, zero.state, loading, pilot.weight, aside)
+                    if gap <= tolerances.REACHED
+                ]
+                off = [one for one in bent if self.run.near(zero, one, OFF) and self.run.clear(one.fields)]
+                fallen = [self.run.relaxed(pilot.model.mesh, one, way) for one in off]
+                rests = [one for one in fallen if one is not None]
+                if rests:
+                    return share * factor, min(rests, key=lambda one: one.point.potential)
         return None
 
     def _alone(self, pilot: Prepared, factor: float, zero: Solved) -> Equilibrium | None:
@@ -167,26 +172,48 @@ class MemberContactSteps:
         # On its way all divides as what touches asks for: where lines end is then known on a mesh that is prescribed.
         self.run.hold(())
         begin, start = 0.0, self.run.lying(zero)
-        if self.last is not None and self.last[0] * (factor - self.last[0]) >= 0.0:
-            begin, start = self.last
-        elif start is not zero and (off := self._bent_off(pilot, factor, zero)) is not None:
-            begin, start = off.factor, off
-        elif pilot.model.standing or any(pilot.model.factors(0.0).values()):
+        last = self.last if self.last is not None and self.last[0] * (factor - self.last[0]) >= 0.0 else None
+        ways = list[Callable[[], tuple[float, Solved] | None]]()
+        if start is not zero:
+            ways.append(partial(self._bent_off, pilot, factor, zero))
+        if last is not None:
+            begin, start = last
+            # What was followed from where it was is followed on.
+            ways.insert(len(ways) if last[0] == 0.0 else 0, lambda: (begin, start))
+        else:
+            ways.append(partial(self._growing, pilot, factor, start is zero, start))
+        for way in ways:
+            first = way()
+            led = None if first is None else self._led(first[1], first[0], factor)
+            if led is not None:
+                return led
+        return self._known(None), ()
+
+    def _growing(self, pilot: Prepared, factor: float, apart: bool, start: Solved) -> tuple[float, Solved]:
+        """The factor and the state from which loads grow, where obstacles are ``apart`` without loads, or not."""
+        if pilot.model.standing or any(pilot.model.factors(0.0).values()):
             # What acts already without the factor.
             found = self.run.follow(lambda t: lambda model: model.loading(0.0, t), start)
-            start = self._known(found)
-        elif (pilot.lacks_slack or pilot.diagnosis.mobility) and start is zero:
-            bent = self._begun(pilot, factor, zero)
+            return 0.0, self._known(found)
+        if (pilot.lacks_slack or pilot.diagnosis.mobility) and apart:
+            bent = self._begun(pilot, factor, start)
             if bent is not None:
-                begin, start = bent.factor, bent
-            elif pilot.diagnosis.mobility:
+                return bent.factor, bent
+            if pilot.diagnosis.mobility:
                 begin = SMALL * factor
-                start = self._known(self.run.relaxed(pilot.model.mesh, zero, lambda model: model.loading(begin)))
+                found = self.run.relaxed(pilot.model.mesh, start, lambda model: model.loading(begin))
+                return begin, self._known(found)
+        return 0.0, start
+
+    def _led(self, start: Solved, begin: float, factor: float) -> tuple[Solved, tuple[str, ...]] | None:
+        """The state that the loads lead to from one at another factor, and notes on the way; None where it is lost."""
         notes: tuple[str, ...] = ()
-        stops = stops_between(self.scene, begin, factor) if begin != factor else []
+        stops = stops_between(self.scene, begin, factor) if begin != factor else ()
         for a, b in itertools.pairwise(stops):
-            start = self._known(self.run.follow(partial(on_way, a, b), start))
-            notes += self.run.notes(a, b)
+            there = self.run.follow(partial(on_way, a, b), start)
+            if there is None:
+                return None
+            start, notes = there, notes + self.run.notes(a, b)
         return start, notes
 
     def _known(self, found: Solved | None) -> Solved:

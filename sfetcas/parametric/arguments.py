@@ -115,10 +115,13 @@ class Argument:
     def limits(self) -> tuple[float, float]:
         """Least and largest accepted value: the range, or what is possible.
 
-        That is above zero for stiffness and radii, from zero for masses and tension, anything for others.
+        That is above zero for stiffness and radii, from zero for masses and tension, to zero and from zero for the two
+        sides of a stop, anything for others.
         """
         if self.low is not None and self.high is not None:
             return self.low, self.high
+        if self.name.endswith((".stop.0", ".stop.1")):
+            return (-np.inf, 0.0) if self.name.endswith("0") else (0.0, np.inf)
         entry = (".law." in self.name or ".stretch_law." in self.name) and (
             self.components is not None or self.name[-1].isdigit()
         )
@@ -511,7 +514,9 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
         return {"actuations": "1/m", "fields": "T"}[path[0]]
     if path[0] == "springs" and len(path) > 2:
         turning = scene.springs[path[1]].type == "rotational"
-        return {"stiffness": "N m" if turning else "N/m", "rest": "rad" if turning else "m"}.get(key, "m")
+        return {"stiffness": "N m" if turning else "N/m"}.get(
+            key, "rad" if turning and key in ("rest", "stop") else "m"
+        )
     if path[0] == "tubes" and key == "curvature":
         return "1/m"
     if path[0] == "tendons" and key == "stiffness":

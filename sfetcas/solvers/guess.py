@@ -245,11 +245,18 @@ def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -
     return _least(sides)[2]
 
 
-def bends(equations: Equations, state: State, loading: Loading, weight: Array) -> Iterator[tuple[State, State, float]]:
+def bends(
+    equations: Equations, state: State, loading: Loading, weight: Array, aside: float = 0.0
+) -> Iterator[tuple[State, State, float]]:
     """A state with straight members bent slightly, each by itself or chains as a whole, to either side; with each what
     :func:`restore` makes of it, and the gap that is left.
+
+    Ends of members are bent by up to a share ``aside`` less and more than their middles.
     """
-    for vectors in (_bow(equations), _tent(equations)):
+    uneven = np.ones((len(equations.model.rotations.kind), 1))
+    for name in equations.model.members:
+        uneven[equations.model.chain(name), 0] += aside * (2.0 * equations.model.along(name) - 1.0)
+    for vectors in (uneven * _bow(equations), uneven * _tent(equations)):
         share = _fitting(equations, state, loading, vectors)
         for sign in (share, -share):
             bent = replace(state, q=_turned_by(equations, state, sign * vectors))
