@@ -156,7 +156,7 @@ MOST_FALLS = 12
 """Unstable states on a way that are left, and ends of branches, at most."""
 
 CREEPS = 3
-"""Ends of branches from which a way leads on by one of its shortest steps only, at most: it would do so for ever."""
+"""Falls from ends of branches one after the other without a step between, at most: they would go on to the end."""
 
 BESIDE = "an unstable equilibrium is beside the way: what is a little imperfect may go to its other side"
 """What a note says where the way goes on that comes near to another branch."""
@@ -969,7 +969,7 @@ class MemberContact:
                 step, self.lines.keys = (0.5 if now.part > 0.0 else SOONER) * (part - now.part), lines
                 if there is None and step < narrow and left < now.part:
                     # Where a branch of equilibria ends what moves on comes to rest on another one.
-                    little += part - now.part < narrow
+                    little += 1
                     if little > CREEPS:
                         return None
                     left, there = now.part, self._fallen_from(mesh, now, part, way(part))
@@ -997,7 +997,7 @@ class MemberContact:
                 unstable = None
             # As long as turns by a little less than a stride.
             longer = min(2.0, AIM * self.stride / max(turned, 0.1 * self.stride))
-            pace = turned / (part - now.part) if not falling else 0.0
+            pace, little = turned / (part - now.part) if not falling else 0.0, 0
             now, step = _Step(part, there), longer * (part - now.part) if not falling else self.first
         return now.solved
 
