@@ -903,9 +903,10 @@ def test_slackness_is_not_searched_with_modes_on_a_path():
         rod(pull=0.01, analysis={"type": "path", "range": [0, 1], "modes": 2})
 
 
-def test_slackness_is_not_searched_in_generated_code(tmp_path):
-    with pytest.raises(SceneError, match=r"tendons\.t: whether a tendon is slack is found by a search that is not"):
-        sfetcas.export(rod(pull=0.01), tmp_path)
+def test_generated_code_says_where_a_string_is_slack(tmp_path):
+    solver = sfetcas.export(rod(pull=0.01), tmp_path / "c", arguments=["tendons.t.pull"])
+    codes = [solver.solve(np.array([pull]))[0].code.name for pull in (0.01, 0.02, -0.01)]
+    assert codes == ["SOLVED", "SOLVED", "TOUCHES"]
 
 
 def test_a_pull_does_not_jump():
