@@ -933,7 +933,7 @@ class MemberContact:
         self.stood = False
         unstable: _Step | None = None
         self.patient = False
-        now, step, left, pace, little = _Step(0.0, start), self.first, -1.0, 0.0, 0
+        now, step, left, pace, creeps = _Step(0.0, start), self.first, -1.0, 0.0, 0
         # In space what is driven by a whole turn looks as if it were not.
         turn = way(1.0)(start.model).plus(way(0.0)(start.model).scaled(-1.0)).turned if start.model.space else 0.0
         while now.part < 1.0:
@@ -969,8 +969,8 @@ class MemberContact:
                 step, self.lines.keys = (0.5 if now.part > 0.0 else SOONER) * (part - now.part), lines
                 if there is None and step < narrow and left < now.part:
                     # Where a branch of equilibria ends what moves on comes to rest on another one.
-                    little += 1
-                    if little > CREEPS:
+                    creeps += 1
+                    if creeps > CREEPS:
                         return None
                     left, there = now.part, self._fallen_from(mesh, now, part, way(part))
                     now, step = (now, step) if there is None else (_Step(part, there), self.first)
@@ -997,7 +997,7 @@ class MemberContact:
                 unstable = None
             # As long as turns by a little less than a stride.
             longer = min(2.0, AIM * self.stride / max(turned, 0.1 * self.stride))
-            pace, little = turned / (part - now.part) if not falling else 0.0, 0
+            pace, creeps = turned / (part - now.part) if not falling else 0.0, 0
             now, step = _Step(part, there), longer * (part - now.part) if not falling else self.first
         return now.solved
 

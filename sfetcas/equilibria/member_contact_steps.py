@@ -25,7 +25,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model
 from ..solvers.continuation import between
-from ..solvers.guess import bends
+from ..solvers.guess import bends, least
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.redundancy import loose_rows, redundant
 from .force_balance import refuse_lost_forces
@@ -143,7 +143,8 @@ class MemberContactSteps:
                 fallen = [self.run.relaxed(pilot.model.mesh, one, way) for one in off]
                 rests = [one for one in fallen if one is not None]
                 if rests:
-                    return share * factor, min(rests, key=lambda one: one.point.potential)
+                    # Humps at either end may have one energy: of these rounding must not choose.
+                    return share * factor, least([(0.0, one.point.potential, one) for one in rests])[2]
         return None
 
     def _alone(self, pilot: Prepared, factor: float, zero: Solved) -> Equilibrium | None:

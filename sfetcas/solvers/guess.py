@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from ..mechanics.rotations import RotationFreedom
 from .newton import TURN, Iterate, Moving, descend, newton
 from .redundancy import loose_rows
 
-__all__ = ["bends", "first_guess", "lacks_slack", "lead", "restore"]
+__all__ = ["bends", "first_guess", "lacks_slack", "lead", "least", "restore"]
 
 LEADING, SETTLING = 30, 10
 """Steps in which the targets of nodes move to their start places, and further steps with the targets at rest."""
@@ -145,12 +146,12 @@ def _placed(equations: Equations, state: State, loading: Loading, weight: Array,
             bent = replace(state, q=_turned_by(equations, state, curl))
             placed, gap = lead(equations, bent, loading, weight, targets)
             sides.append((gap, equations.at(placed, loading.unloaded()).strain, placed))
-        return _least(sides, NEAR_TARGET)
+        return least(sides, NEAR_TARGET)
 
     best = tried((0.5, -0.5))
     # With both ends fixed, curls would change the twist that motions prescribe.
     if best[0] > NEAR_TARGET and equations.rows <= equations.displacement_unknowns:
-        best = _least([best, tried((2.0, -2.0, 4.0, -4.0, 6.0, -6.0))], NEAR_TARGET)
+        best = least([best, tried((2.0, -2.0, 4.0, -4.0, 6.0, -6.0))], NEAR_TARGET)
     return replace(best[2], lam=np.zeros(equations.rows))
 
 
@@ -242,7 +243,7 @@ def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -
         (gap, equations.at(closed, loading).potential, bent)
         for bent, closed, gap in bends(equations, state, loading, weight)
     ]
-    return _least(sides)[2]
+    return least(sides)[2]
 
 
 def bends(
@@ -279,7 +280,7 @@ def _fitting(equations: Equations, state: State, loading: Loading, vectors: Arra
     return best if best > SHARES[-1] else 1.0
 
 
-def _least(sides: list[tuple[float, float, State]], near: float = 0.0) -> tuple[float, float, State]:
+def least(sides: list[tuple[float, float, Any]], near: float = 0.0) -> tuple[float, float, Any]:
     """The entry of least energy among those with a gap up to ``near``, or else of least gap; of equal ones the first.
 
     Mirror images differ by rounding only.
