@@ -166,26 +166,29 @@ def test_members_that_cross_are_seen_as_near_as_they_are():
     assert codes == [Code.SOLVED, Code.TOUCHES]
 
 
-@needs_compiler
-def test_c_has_the_bits_of_the_process(tmp_path):
-    scene = pressed({"c": DRUM})
-    made = export(scene, tmp_path / "c", **LOADS)
-    said(built(tmp_path / "c", "structure"))
-    subprocess.run(["make", "CC=gcc", "-s"], cwd=tmp_path / "c", check=True)
-    library = ctypes.CDLL(
-        str(tmp_path / "c" / ("libstructure.dylib" if sys.platform == "darwin" else "libstructure.so"))
-    )
+def codes_of_both(solver, folder, cases):
+    """The codes of an exported solver for arguments, cold, after its results in C have the bits of the process."""
+    said(built(folder, "structure"))
+    subprocess.run(["make", "CC=gcc", "-s"], cwd=folder, check=True)
+    library = ctypes.CDLL(str(folder / ("libstructure.dylib" if sys.platform == "darwin" else "libstructure.so")))
     doubles = ctypes.POINTER(ctypes.c_double)
     memory = ctypes.create_string_buffer(10_000_000)
     codes = []
-    for load in ([0.0, -2.0], [0.3, -2.5], [0.0, -1.0], [0.0, 1.0], [-10.0, -20.0]):
-        outcome, results = made.solve(np.array(load))
-        given, state, there = np.array(load), np.zeros(made.method.states), np.zeros(made.results.size)
+    for case in cases:
+        outcome, results = solver.solve(np.array(case))
+        given, state, there = np.array(case), np.zeros(solver.method.states), np.zeros(solver.results.size)
         pointers = [x.ctypes.data_as(doubles) for x in (given, state, there)]
-        code = library.structure_solve(memory, pointers[0], pointers[1], 0, pointers[2], None)
-        codes.append(Code(code))
-        assert code == outcome.code
+        codes.append(Code(library.structure_solve(memory, pointers[0], pointers[1], 0, pointers[2], None)))
+        assert codes[-1] == outcome.code
         np.testing.assert_array_equal(there, results)
+    return codes
+
+
+@needs_compiler
+def test_c_has_the_bits_of_the_process(tmp_path):
+    made = export(pressed({"c": DRUM}), tmp_path / "c", **LOADS)
+    cases = [[0.0, -2.0], [0.3, -2.5], [0.0, -1.0], [0.0, 1.0], [-10.0, -20.0]]
+    codes = codes_of_both(made, tmp_path / "c", cases)
     # The last one is followed from the first.
     assert codes == [Code.SOLVED, Code.SOLVED, Code.TOUCHES, Code.TOUCHES, Code.SOLVED]
     assert "STRUCTURE_TOUCHES = 6" in (tmp_path / "c" / "structure.h").read_text()

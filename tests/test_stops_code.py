@@ -1,16 +1,14 @@
 """Generated C of scenes with stops and strings: the same are taut and at a stop, or a status says that they are not."""
 
-import ctypes
 import importlib
 import itertools
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scenes import made
-from test_codegen import built, needs_compiler, said
+from test_codegen import needs_compiler
+from test_contact_code import codes_of_both
 from test_stops import STOP, lever
 
 from sfetcas import SceneError, SolveError, export, load, solve
@@ -129,23 +127,8 @@ def test_a_number_on_which_nothing_depends_is_refused():
 
 @needs_compiler
 def test_c_has_the_bits_of_the_process(tmp_path):
-    scene = made(along())
-    solver = export(scene, tmp_path / "c", arguments=["loads.f.value.1"], sensitivities=True)
-    said(built(tmp_path / "c", "structure"))
-    subprocess.run(["make", "CC=gcc", "-s"], cwd=tmp_path / "c", check=True)
-    library = ctypes.CDLL(
-        str(tmp_path / "c" / ("libstructure.dylib" if sys.platform == "darwin" else "libstructure.so"))
-    )
-    doubles = ctypes.POINTER(ctypes.c_double)
-    memory = ctypes.create_string_buffer(10_000_000)
-    codes = []
-    for value in (1.0, 0.9, 6.0, -3.0, 0.5, np.nan):
-        outcome, results = solver.solve(np.array([value]))
-        given, state, there = np.array([value]), np.zeros(solver.method.states), np.zeros(solver.results.size)
-        pointers = [x.ctypes.data_as(doubles) for x in (given, state, there)]
-        codes.append(Code(library.structure_solve(memory, pointers[0], pointers[1], 0, pointers[2], None)))
-        assert codes[-1] == outcome.code
-        np.testing.assert_array_equal(there, results)
+    solver = export(made(along()), tmp_path / "c", arguments=["loads.f.value.1"], sensitivities=True)
+    codes = codes_of_both(solver, tmp_path / "c", [[value] for value in (1.0, 0.9, 6.0, -3.0, 0.5, np.nan)])
     assert {Code.SOLVED, Code.TOUCHES, Code.BAD_ARGUMENT} <= set(codes)
 
 
