@@ -206,4 +206,4 @@ def test_of_shapes_whose_gaps_differ_by_rounding_that_of_less_energy_begins():
     state = object()
     gap = 5e-7
     sides = [(gap * (1.0 - 1e-12), 2.0, state), (gap * (1.0 + 1e-12), 1.0, state), (1.0, 0.0, state)]
-    assert guess._least(sides)[1] == 1.0
+    assert guess.least(sides)[1] == 1.0
