@@ -35,7 +35,6 @@ __all__ = [
     "ends_of",
     "lies_along",
     "on_line",
-    "points_in",
     "points_of",
 ]
 
@@ -717,15 +716,7 @@ class Lines:
 
 def points_of(found: Solved) -> Points:
     """The points of a state, where they are now."""
-    return points_in(found.fields)
-
-
-def points_in(fields: Fields) -> Points:
-    """As :func:`points_of`."""
-    return tuple(
-        replace(point, at=fields.contact_point(point)["at"]) if any(point.slides) else point
-        for point in fields.model.mesh.points
-    )
+    return found.fields.contact_points
 
 
 def ends_of(lines: Mapping[PairKey, list[list[float]]]) -> set[tuple[PairKey, float]]:

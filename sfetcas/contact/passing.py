@@ -20,7 +20,6 @@ from ..mechanics.fields import Fields
 from .closest import Closest
 from .edges import Edges
 from .gripping import Placed
-from .lines import points_in
 from .pairs import Near, Pair, PairKey
 
 __all__ = ["ROUND", "Passing", "tangents_turned"]
@@ -136,7 +135,7 @@ class Passing:
         into it on the way, where that pushes it to another side.
         """
         had = _touching(before)
-        begun = [p for p in points_in(after) if len(p.members) == 1 and not p.edge and p.pair not in had]
+        begun = [p for p in after.contact_points if len(p.members) == 1 and not p.edge and p.pair not in had]
         earlier, now = (Placed(self.scene, fields, begun) for fields in (before, after))
         stops = (self.closest.pairs[point.pair].stop for point in begun)
         cosines = [earlier.normal(i, stop) @ now.normal(i, stop) for i, stop in enumerate(stops)]

@@ -198,11 +198,19 @@ class Balance:
 
     def answers(self, table: str, name: str) -> dict[str, float]:
         """Quantities that the terms of a record (``table``, ``name``) add to the answer, by key, in SI units."""
-        found: dict[str, float] = {}
-        for number, i in connections_of(self.model.connections, table, name):
-            units = self.model.connections[number].kind.answers
-            values = self._answers(number)[i].tolist()
-            found |= {key: x * self.model.scales.of(unit) for (key, unit), x in zip(units.items(), values, strict=True)}
+        return dict(self._told(table).get(name, {}))
+
+    @kept(GROUPS)
+    def _told(self, table: str) -> dict[str, dict[str, float]]:
+        """As of :meth:`answers`, for all records of a table; of several terms of one kind the first tells."""
+        found: dict[str, dict[str, float]] = {}
+        for number, group in enumerate(self.model.connections):
+            units = group.kind.answers if group.kind.table == table else {}
+            if units:
+                sizes = np.array([self.model.scales.of(unit) for unit in units.values()])
+                rows = dict(zip(group.names[::-1], (self._answers(number) * sizes).tolist()[::-1], strict=True))
+                for name, row in rows.items():
+                    found.setdefault(name, {}).update(zip(units, row, strict=True))
         return found
 
     @kept(GROUPS)

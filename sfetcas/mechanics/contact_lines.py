@@ -17,7 +17,7 @@ Source: mortar methods; Wriggers 2006, Computational Contact Mechanics, section 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, final
 
@@ -294,14 +294,15 @@ def tangential_at(parts: Parts, point: ContactPoint, gap: Term, data: Array, car
 
 
 def pressed_along(
-    parts: Parts, point: ContactPoint, gap: Term, ways: list[Array], origin: Array, distance: Any, carrier: Carrier
-) -> Iterator[One]:
-    """Terms of one end of elements on a line.
+    parts: Parts, points: Sequence[ContactPoint], gap: Term, ways: list[Array], origin: Array, distance: Any
+) -> dict[str, list[One]]:
+    """Terms of ends of elements on a line, those of each point by its name.
 
     Parameters
     ----------
     parts : Parts
-    point : ContactPoint
+    points : sequence of ContactPoint
+        Of one member on one obstacle, all with friction or all without.
     gap : Term
         How it is measured, see :class:`~sfetcas.mechanics.contact_points.Gap`.
     ways : list of ndarray
@@ -310,45 +311,39 @@ def pressed_along(
         Place of the obstacle, m.
     distance : float
         From it, or the plane, to the centre line, m.
-    carrier : Carrier
-        What carries it.
     """
-    member, unit, axes, grip = point.members[0], parts.scales.length, parts.element.axes, point.grip
-    yield One(
-        Mean(parts.element.space, grip is not None),
-        point.name,
-        "",
-        np.zeros(0),
-        (),
-        (parts.segments.place(point.between),),
-        point.name,
-    )
-    cuts, line, along = parts.mesh.cuts[member], parts.scene.center_lines[member], np.zeros((0, 3))
-    if grip is not None:
-        along = np.array(grip.along)
-    begin = 0
-    for element, rising, share in beside_line(parts.mesh, point):
-        number = parts.beams.first[member] + element
-        x = cuts[element] + parts.element.points * (cuts[element + 1] - cuts[element])
-        own = along[begin : begin + len(x) * (axes - 1), :axes]
-        begin += len(own)
-        data = [
-            parts.beams.tangent[number].ravel(),
-            parts.beams.compliance[number].ravel(),
-            ((line.positions(x) - origin)[:, :axes] / unit).ravel(),
-            *(way[:axes] for way in ways),
-            numbers([distance / unit, share]),
-            own.ravel(),
-            carrier.arm[:axes] / unit,
-        ]
-        start = parts.segments.place(place_of_cut(parts.mesh, parts.segments.ends, member, element))
-        yield One(
-            Pressed(parts.element.space, parts.element, gap, rising, grip is not None, bool(carrier.node)),
-            point.name,
-            carrier.node,
-            numbers(np.concatenate(data)),
-            (*parts.rotations.turns[number].tolist(), *carrier.turns),
-            (*parts.segments.strains[number].tolist(), start, *carrier.places),
-            point.name,
-            element=number,
-        )
+    segments, element, mesh, unit = parts.segments, parts.element, parts.mesh, parts.scales.length
+    axes = element.axes
+    member, rough, carrier = points[0].members[0], points[0].grip is not None, carrier_of(parts, points[0].contact)
+    cuts, first = mesh.cuts[member], parts.beams.first[member]
+    each = [(point, *one) for point in points for one in beside_line(mesh, point)]
+    number, begins = first + (own := np.array([e for _, e, *_ in each])), cuts[own]
+    x = begins[:, None] + element.points * (cuts[own + 1] - begins)[:, None]
+    n = len(each)
+    places = parts.scene.center_lines[member].positions(x.ravel()) - origin
+    along = [np.array(point.grip.along)[:, :axes] for point in points if point.grip is not None]
+    every = np.ones((n, 1))
+    data = [
+        parts.beams.tangent[number].reshape(n, -1),
+        parts.beams.compliance[number].reshape(n, -1),
+        (places[:, :axes] / unit).reshape(n, -1),
+        *(every * way[:axes] for way in ways),
+        every * (distance / unit),
+        numbers([share for *_, share in each])[:, None],
+        *([np.concatenate(along).reshape(n, -1)] if rough else []),
+        every * (carrier.arm[:axes] / unit),
+    ]
+    rows = numbers(np.concatenate(data, axis=1))
+    pressed = {ends: Pressed(element.space, element, gap, ends, rough, bool(carrier.node)) for ends in (False, True)}
+    mean = Mean(element.space, rough)
+    found = {
+        point.name: [One(mean, point.name, "", np.zeros(0), (), (segments.place(point.between),), point.name)]
+        for point in points
+    }
+    turns, strains = parts.rotations.turns[number].tolist(), segments.strains[number].tolist()
+    for i, (point, cut, rising, _) in enumerate(each):
+        start = segments.place(place_of_cut(mesh, segments.ends, member, cut))
+        sides = (*turns[i], *carrier.turns), (*strains[i], start, *carrier.places)
+        one = One(pressed[rising], point.name, carrier.node, rows[i], *sides, point.name, element=first + cut)
+        found[point.name].append(one)
+    return found

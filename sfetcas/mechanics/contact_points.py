@@ -342,11 +342,13 @@ def _distance(scene: Scene, point: ContactPoint) -> Any:
 def contact_points_in(parts: Parts) -> Iterator[One]:
     """Terms of the points where members touch each other or obstacles."""
     segments, unit, axes, space = parts.segments, parts.scales.length, parts.element.axes, parts.element.space
-    vectors = undeformed_vectors(parts.scene, parts.mesh.points)
+    vectors, pressed = undeformed_vectors(parts.scene, parts.mesh.points), _of_lines(parts)
     for point, begin in zip(parts.mesh.points, vectors, strict=True):
         between = segments.place(point.between)
         if point.line:
-            yield from _of_line(parts, point)
+            axis = np.concatenate([np.eye(axes)[0], np.zeros(axes + 1)])
+            yield from pressed[point.name]
+            yield _held(parts, point, Gap(space, True), axis, np.zeros(3), [])
             continue
         slides = [segments.place(point.place(i)) if free else GROUND for i, free in enumerate(point.slides)]
         stands = [standing(parts.mesh, point, side) for side in range(len(point.members))]
@@ -375,18 +377,20 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
             yield tangential_at(parts, point, gap, data, carrier)
 
 
-def _of_line(parts: Parts, point: ContactPoint) -> Iterator[One]:
-    """Terms of an end of elements on a line: the mean of the gap is a component along a normal."""
-    stop, space = parts.scene.obstacles[point.contact], parts.element.space
-    normal = tuple(stop.normal.tolist()) if stop.kind == "flat" else None
-    gap, ways = _gap(parts.scene, replace(point, normal=normal), space)
-    # What is held, means, is not turned.
-    gap = replace(gap, carried=False)
-    distance, carrier = _distance(parts.scene, point), carrier_of(parts, point.contact)
-    yield from pressed_along(parts, point, gap, ways, stop.place, distance, carrier)
-    axes = parts.element.axes
-    data = np.concatenate([np.eye(axes)[0], np.zeros(axes + 1)])
-    yield _held(parts, point, Gap(space, True), data, np.zeros(3), [])
+def _of_lines(parts: Parts) -> dict[str, list[One]]:
+    """Terms of ends of elements on lines, by names of points: the mean of the gap is a component along a normal."""
+    lines, found = dict[Any, list[ContactPoint]](), dict[str, list[One]]()
+    for point in parts.mesh.points:
+        if point.line:
+            lines.setdefault((*point.pair, point.grip is None), []).append(point)
+    for points in lines.values():
+        stop = parts.scene.obstacles[points[0].contact]
+        normal = tuple(stop.normal.tolist()) if stop.kind == "flat" else None
+        gap, ways = _gap(parts.scene, replace(points[0], normal=normal), parts.element.space)
+        # What is held, means, is not turned.
+        gap = replace(gap, carried=False)
+        found |= pressed_along(parts, points, gap, ways, stop.place, _distance(parts.scene, points[0]))
+    return found
 
 
 def _held(parts: Parts, point: ContactPoint, gap: Gap, data: Array, begin: Array, slides: list[int]) -> One:

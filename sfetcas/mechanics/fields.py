@@ -8,6 +8,7 @@ first node of a member is minus the gradient of its energy there, and the rest f
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -199,6 +200,21 @@ class Fields:
         far the first one has slipped since the last state of the way, ``rubs`` N the size that the law of friction is
         for, ``sticks`` whether it sticks by more than little, and ``slides`` whether it has slid since then.
         """
+        return self._touching[point.name]
+
+    @functools.cached_property
+    def contact_points(self) -> tuple[ContactPoint, ...]:
+        """The points of contact of the mesh, where they are now."""
+        points, told = self.model.mesh.points, self._touching
+        return tuple(replace(p, at=told[p.name]["at"]) if any(p.slides) else p for p in points)
+
+    @functools.cached_property
+    def _touching(self) -> dict[str, dict[str, Any]]:
+        """As of :meth:`contact_point`, by the names of points."""
+        return {point.name: self._told(point) for point in self.model.mesh.points}
+
+    def _told(self, point: ContactPoint) -> dict[str, Any]:
+        """As of :meth:`contact_point`, of a point of the mesh."""
         found, lines = self.balance.answers("contacts", point.name), self.model.scene.center_lines
         moved = (found.get("moved on first", 0.0), found.get("moved on second", 0.0))
         at = tuple(float(a + s / lines[m].length) for a, s, m in zip(point.at, moved, point.members, strict=False))

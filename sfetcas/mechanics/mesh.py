@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bisect
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
@@ -139,18 +141,18 @@ class ContactPoint:
     edge: float = 0.0
     tangent: bool = False
 
-    @property
+    @functools.cached_property
     def name(self) -> str:
         """Name of its rows, and of its places."""
         return f"contacts.{self.contact}, point {self.number + 1}"
 
-    @property
+    @functools.cached_property
     def key(self) -> tuple[object, ...]:
         """What tells it from other points of a state: what touches, where, and what it stands for."""
         at = tuple(round(min(max(x, 0.0), 1.0), 9) for x in self.at)
         return self.contact, self.members, at, self.line and self.sides
 
-    @property
+    @functools.cached_property
     def pair(self) -> tuple[str, tuple[str, ...]]:
         """The record and its members: what it is a point of."""
         return self.contact, self.members
@@ -183,7 +185,7 @@ class ContactPoint:
         """Name of the place whose displacements are its forces across and along, where there is friction."""
         return f"forces of {self.name}"
 
-    @property
+    @functools.cached_property
     def between(self) -> str:
         """Name of the place that is the vector from the second centre line, or the obstacle, to the first."""
         return f"distance of {self.name}"
@@ -398,7 +400,14 @@ class Mesh:
 
     def cut_at(self, member: str, place: float) -> int:
         """Index in ``cuts`` of the end of elements that is nearest to a fraction of a member's length."""
-        return int(np.argmin(np.abs(self.cuts[member] - place)))
+        cuts = self._listed[member]
+        i = min(max(bisect.bisect_left(cuts, place), 1), len(cuts) - 1)
+        return i if cuts[i] - place < place - cuts[i - 1] else i - 1
+
+    @functools.cached_property
+    def _listed(self) -> dict[str, list[float]]:
+        """The ends of elements as lists, in which a single one is found faster."""
+        return {member: cuts.tolist() for member, cuts in self.cuts.items()}
 
     def element_at(self, member: str, place: float) -> int:
         """The element, counted from 0, in which a fraction of a member's length is; of two that meet, the first."""

@@ -145,9 +145,11 @@ class Segments:
 
 def standing(mesh: Mesh, point: ContactPoint, side: int) -> int | None:
     """Number of the end of elements at which a point of contact stays on a member; None where it is within one."""
-    at, cuts = point.at[side], mesh.cuts[point.members[side]]
-    near = int(np.argmin(np.abs(cuts - at)))
-    return near if not point.slides[side] and abs(cuts[near] - at) < SAME_CUT else None
+    if point.slides[side]:
+        return None
+    at, member = point.at[side], point.members[side]
+    near = mesh.cut_at(member, at)
+    return near if abs(mesh.cuts[member][near] - at) < SAME_CUT else None
 
 
 def beside_line(mesh: Mesh, point: ContactPoint) -> list[tuple[int, bool, float]]:

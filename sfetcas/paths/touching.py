@@ -21,7 +21,7 @@ import numpy as np
 from .. import tolerances
 from ..contact.closest import AT_END
 from ..contact.held_inside import refuse_held_inside
-from ..contact.lines import LINE, lies_along, points_in, points_of
+from ..contact.lines import LINE, lies_along, points_of
 from ..contact.member_contact import MemberContact
 from ..contact.pairs import ONE, Near, doing
 from ..description.records import enumerated
@@ -255,7 +255,7 @@ class Touching(Conditions[_At]):
 
     def near(self, fields: Fields, crossed: Sequence[int] = ()) -> list[_At]:
         """As of :class:`.Conditions`."""
-        found, points = self._margins(fields), points_in(fields)
+        found, points = self._margins(fields), fields.contact_points
         close = [one for one, margin in found if abs(margin) <= NEAR and not isinstance(one, _Driven)]
         close += [_touch(one) for one in self._free(fields, points, NEAR * fields.model.scales.length)]
         close += [end for point in points for end, margin in self._beyond(fields, point) if abs(margin) <= NEAR]
@@ -266,12 +266,12 @@ class Touching(Conditions[_At]):
 
     def margin(self, fields: Fields, which: Sequence[_At]) -> Array:
         """As of :class:`.Conditions`."""
-        points = points_in(fields)
+        points = fields.contact_points
         return np.array([self._margin(fields, points, one) for one in which])
 
     def _margins(self, fields: Fields) -> list[tuple[_At, float]]:
         """Conditions and their margins, as many in each state with the same places."""
-        points, scales = points_in(fields), fields.model.scales
+        points, scales = fields.contact_points, fields.model.scales
         nearest: dict[tuple[str, tuple[str, ...]], Near] = {}
         for near in self._free(fields, points, self.reach):
             if near.pair not in nearest or near.gap < nearest[near.pair].gap:
@@ -467,7 +467,7 @@ class Touching(Conditions[_At]):
     def becomes(self, one: _At, fields: Fields) -> str:
         """As of :class:`.Conditions`."""
         if isinstance(one, _End):
-            comes = self._slides(one, points_in(fields))
+            comes = self._slides(one, fields.contact_points)
             return f"contacts.{one.contact} {'comes to the end of' if comes else 'goes on along'} {one.member}"
         return one.told("leaves" if self.active(one, fields) else "touches")
 
@@ -502,13 +502,13 @@ class Touching(Conditions[_At]):
 
     def _lies(self, fields: Fields, new: _Touch) -> bool:
         """Whether a place that begins to touch makes a line with others of two members, as in statics."""
-        beside = [point for point in points_in(fields) if point.pair == new.pair and len(point.members) == 2]
+        beside = [point for point in fields.contact_points if point.pair == new.pair and len(point.members) == 2]
         near = any(self.closest.alike(new.pair, new.at, point.at) for point in beside)
         return not new.active and (near or len(beside) + 1 >= LINE)
 
     def flat(self, fields: Fields, near: Sequence[_At] = ()) -> list[ContactPoint]:
         """As of :class:`.Conditions`: the gap is not curved there."""
-        points = points_in(fields)
+        points = fields.contact_points
         points += tuple(self._new(one) for one in near if isinstance(one, _Touch) and one.at and not one.active)
         clamped = [one for one, bend in self._clamped(fields) if bend <= NEAR]
         points += tuple(
@@ -541,7 +541,7 @@ class Touching(Conditions[_At]):
     def may_be_flat(self, fields: Fields) -> bool:
         """As of :class:`.Conditions`: the curvature is told to what a force within an element changes it by."""
         model, found = fields.model, False
-        for begun, point in zip(model.mesh.points, points_in(fields), strict=True):
+        for begun, point in zip(model.mesh.points, fields.contact_points, strict=True):
             if len(point.members) > 1 or point.edge or not (point.slides[0] and self.run.lines.bends(point.members[0])):
                 continue
             (member,), at, cuts = point.members, point.at[0], model.mesh.cuts[point.members[0]]
@@ -565,7 +565,7 @@ class Touching(Conditions[_At]):
         touches = [one for one in which if isinstance(one, _Touch)]
         ends = [one for one in which if isinstance(one, _End)]
         kept: list[ContactPoint] = []
-        for point in points_in(fields):
+        for point in fields.contact_points:
             if any(one.active and self._same_place(point, one) for one in touches):
                 continue
             own = [one for one in ends if one.pair == point.pair and one.at == point.at]
@@ -627,7 +627,7 @@ class Touching(Conditions[_At]):
 
     def fitted(self, mesh: Mesh, fields: Fields) -> Mesh:
         """As of :class:`.Conditions`."""
-        fitted, _ = self.run.lines.fitted(mesh, points_in(fields))
+        fitted, _ = self.run.lines.fitted(mesh, fields.contact_points)
         return mesh if mesh.same(fitted) else fitted
 
     def _freed(self, fields: Fields, point: ContactPoint) -> ContactPoint:
