@@ -144,7 +144,12 @@ class Lines:
             on_line = len(point.members) == 1 and self.has(point) and standing(mesh, point, 0) is not None
             return on_line and self.bends(point.members[0]) and not (self.chosen(point.pair) and all(point.sides))
 
-        return [replace(point, number=i, line=spread(point)) for i, point in enumerate(points)]
+        found = list[ContactPoint]()
+        for i, point in enumerate(points):
+            line = spread(point)
+            same = point.number == i and point.line == line
+            found.append(point if same else replace(point, number=i, line=line))
+        return found
 
     def laid(self, near: Iterable[Near]) -> list[ContactPoint]:
         """The points of ends of elements that begin to touch along a line."""

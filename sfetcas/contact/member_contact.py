@@ -562,32 +562,28 @@ class MemberContact:
             lam[closing] = forces
         rows = {name: i for i, name in reversed(list(enumerate(target.row_names)))}
         unit, axes = target.scales.length, target.element.axes
-        # Those that continue are where the points of the state are now.
-        now = zip(points_of(source), before.mesh.points, strict=True)
-        # Those that have slid beyond an end continue there, see :meth:`_freed`.
-        formers = {replace(p, line=former.line).key: former for p, former in now}
-        placed = Placed(self.scene, source.fields, target.mesh.points)
-        begin = undeformed_vectors(self.scene, target.mesh.points)
-        displaced = dict[str, Array]()
-        for member in {member for point in target.mesh.points for member in point.members}:
-            x = target.mesh.cuts[member]
-            change = source.fields.positions(member, x) - target.scene.center_lines[member].positions(x)
-            displaced[member] = change / unit
-        for i, point in enumerate(target.mesh.points):
+        # Those that continue are where the points of the state are now, those that have slid beyond an end there.
+        formers = {p.key: former for p, former in zip(points_of(source), before.mesh.points, strict=True)}
+        single = [point for point in target.mesh.points if not point.line]
+        vectors = zip(
+            Placed(self.scene, source.fields, single).vectors, undeformed_vectors(self.scene, single), strict=True
+        )
+        apart = {point.name: both for point, both in zip(single, vectors, strict=True)}
+        self._displaced(y, numbers, target, source.fields)
+        for point in target.mesh.points:
             turn = source.fields.motion_of(point.contact)
-            now_apart = placed.vectors[i] if turn is None else turn[0] @ placed.vectors[i]
-            change = (now_apart - begin[i])[:axes] / unit
             if point.line:
                 # Nothing has slipped yet.
                 change = np.array(point.grip.origin)[:axes] / unit if point.grip else np.zeros(1)
+            else:
+                now, begun = apart[point.name]
+                change = ((now if turn is None else turn[0] @ now) - begun)[:axes] / unit
             names = ("across", "along", "along too") if point.line else "xyz"
             for k, moved in enumerate(change.tolist()):
                 y[numbers[f"{point.between}, {names[k]}"]] = moved
             for side, free in enumerate(point.slides):
                 if free:
                     y[numbers[f"{point.place(side)}, arc length"]] = 0.0
-                else:
-                    self._placed(y, numbers, target, displaced, point, side)
             former = formers.get(point.key)
             if former is not None and not point.new:
                 # Of what has become a line, or ceases to be one, the push alone goes on.
@@ -611,19 +607,21 @@ class MemberContact:
         return replace(state, y=y, lam=lam)
 
     @staticmethod
-    def _placed(
-        y: Array, numbers: dict[str, int], target: Model, displaced: dict[str, Array], point: ContactPoint, side: int
-    ) -> None:
-        """Enter how far ends of elements have moved whose places a point needs, into displacements (n,) by their
-        numbers.
-        """
-        member = point.members[side]
-        for cut in cuts_of_point(target.mesh, point, side):
-            place = place_of_cut(target.mesh, target.segments.ends, member, cut)
-            for k, axis in enumerate("xyz"[: target.element.axes]):
-                number = numbers.get(f"{place}.{axis}")
-                if number is not None:
-                    y[number] = displaced[member][cut, k]
+    def _displaced(y: Array, numbers: dict[str, int], target: Model, fields: Fields) -> None:
+        """Enter how far ends of elements have moved whose places points need, into displacements (n,) by their numbers."""
+        mesh, cuts = target.mesh, dict[str, set[int]]()
+        for point in mesh.points:
+            for side, (member, free) in enumerate(zip(point.members, point.slides, strict=True)):
+                cuts.setdefault(member, set()).update(() if free else cuts_of_point(mesh, point, side))
+        for member, own in cuts.items():
+            x = mesh.cuts[member][sorted(own)]
+            moved = fields.positions(member, x) - target.scene.center_lines[member].positions(x)
+            for cut, change in zip(sorted(own), (moved / target.scales.length).tolist(), strict=True):
+                place = place_of_cut(mesh, target.segments.ends, member, cut)
+                for axis, way in zip("xyz"[: target.element.axes], change, strict=False):
+                    number = numbers.get(f"{place}.{axis}")
+                    if number is not None:
+                        y[number] = way
 
     def resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float = 0.0) -> Solved | None:
         """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found.

@@ -1,12 +1,14 @@
-"""A cache of results that lives as long as the object that they belong to."""
+"""Caches of results: of an object, as long as that lives, and of all that are alike, as long as there is room."""
 
 from __future__ import annotations
 
 import functools
+import threading
+from collections import OrderedDict
 from collections.abc import Callable
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
-__all__ = ["kept"]
+__all__ = ["Recent", "kept"]
 
 T = TypeVar("T")
 P = ParamSpec("P")
@@ -40,3 +42,35 @@ def kept(most: int) -> Callable[[Callable[Concatenate[T, P], R]], Callable[Conca
         return answer
 
     return decorated
+
+
+class Recent(Generic[T]):
+    """Results by what they are made of; those that were not used for longest make room for others.
+
+    Parameters
+    ----------
+    room, largest : int
+        Sizes of all that are kept together, and of one that is kept.
+    """
+
+    def __init__(self, room: int, largest: int) -> None:
+        self._left, self._largest = room, largest
+        self._known: OrderedDict[Any, tuple[T, int]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def found(self, key: Any, make: Callable[[], T], size: Callable[[T], int]) -> T:
+        """The result of a key, known or made now; ``size`` tells that of a result."""
+        with self._lock:
+            known = self._known.get(key)
+            if known is not None:
+                self._known.move_to_end(key)
+                return known[0]
+        made = make()
+        own = size(made)
+        with self._lock:
+            if own <= self._largest and key not in self._known:
+                self._known[key] = made, own
+                self._left -= own
+                while self._left < 0:
+                    self._left += self._known.popitem(last=False)[1][1]
+        return made

@@ -16,6 +16,7 @@ from ..mathematics.arrays import Array
 from ..mathematics.keeping import kept
 from .batches import GroupBatch
 from .connections import connections_of
+from .contact_lines import Pressed
 from .equations import Equations, State
 from .loading import Loading
 from .segments import elongation_of
@@ -206,12 +207,28 @@ class Balance:
         found: dict[str, dict[str, float]] = {}
         for number, group in enumerate(self.model.connections):
             units = group.kind.answers if group.kind.table == table else {}
-            if units:
+            if units and not isinstance(group.kind, Pressed):
                 sizes = np.array([self.model.scales.of(unit) for unit in units.values()])
                 rows = dict(zip(group.names[::-1], (self._answers(number) * sizes).tolist()[::-1], strict=True))
                 for name, row in rows.items():
                     found.setdefault(name, {}).update(zip(units, row, strict=True))
         return found
+
+    @functools.cached_property
+    def pressed(self) -> dict[str, Array]:
+        """Of each end of elements on a line, by the name of its point, push and friction where there is any (1 or 2,
+        elements, points, 3) N at the points of the elements beside it.
+        """
+        found: dict[bool, dict[str, Array]] = {True: {}, False: {}}
+        for number, group in enumerate(self.model.connections):
+            kind = group.kind
+            if isinstance(kind, Pressed):
+                forces = self._answers(number) * self.model.scales.force
+                forces = forces.reshape(len(forces), 2 if kind.rough else 1, 1, -1, 3)
+                found[kind.rising] |= dict(zip(group.names, forces, strict=True))
+        rising, falling = found[True], found[False]
+        both = {name: np.concatenate([rising[name], falling[name]], axis=1) for name in rising.keys() & falling.keys()}
+        return rising | falling | both
 
     @kept(GROUPS)
     def _answers(self, number: int) -> Array:

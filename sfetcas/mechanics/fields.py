@@ -220,7 +220,7 @@ class Fields:
         at = tuple(float(a + s / lines[m].length) for a, s, m in zip(point.at, moved, point.members, strict=False))
         slip = np.array([found.get(f"slip {axis}", 0.0) for axis in "xyz"])
         if point.line:
-            shares = self._line_forces(point)
+            shares = self.balance.pressed[point.name]
             force, friction = shares.sum(axis=(0, 1, 2)), shares[1:].sum(axis=(0, 1, 2))
         else:
             force = np.array([found[f"force {axis}"] for axis in "xyz"])
@@ -237,17 +237,6 @@ class Fields:
             answer["slides"] = bool(found["beyond"] > 0.0)
         return answer
 
-    def _line_forces(self, point: ContactPoint) -> Array:
-        """Push, and friction where there is any, (1 or 2, elements, points, 3) N of an end of elements on a line at the
-        points of the elements beside it.
-        """
-        found = self.balance.answers("contacts", point.name)
-        kinds = ("push", "friction") if point.grip is not None else ("push",)
-        sides = ["before" if ends else "beyond" for _, ends, _ in beside_line(self.model.mesh, point)]
-        points = range(len(self.model.element.points))
-        shares = [found[f"{a} {b} at {k} {c}"] for a in kinds for c in sides for k in points for b in "xyz"]
-        return np.reshape(shares, (len(kinds), len(sides), len(points), 3))
-
     @functools.cached_property
     def _spread(self) -> Array:
         """Forces along the elements, at their points (elements, points, axes): loads, and what presses along lines."""
@@ -259,7 +248,7 @@ class Fields:
         found, model = np.zeros_like(self._loading.spread), self.model
         for point in (point for point in model.mesh.points if point.line):
             beside = [element for element, *_ in beside_line(model.mesh, point)]
-            forces = self._line_forces(point).sum(axis=0)[..., : model.element.axes] / model.scales.force
+            forces = self.balance.pressed[point.name].sum(axis=0)[..., : model.element.axes] / model.scales.force
             found[model.beams.first[point.members[0]] + np.array(beside)] += forces
         return found
 

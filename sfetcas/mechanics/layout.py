@@ -9,36 +9,29 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections import OrderedDict
 from typing import Any
 
 import numpy as np
 
 from ..mathematics.arrays import Index
+from ..mathematics.keeping import Recent
 from .model import Model
 from .tables import Tables
 
 __all__ = ["Layout", "layout_of"]
 
-KEPT = 32
-"""Layouts that are kept: the meshes of some scenes."""
-
-LARGEST = 20_000
-"""Contributions to the matrix up to which a layout is kept: making larger ones is little beside what they are for."""
+ROOM, LARGEST, EACH = 640_000, 20_000, 5_000
+"""Contributions to matrices that layouts which are kept have together, those of the largest, as making larger ones is
+little beside what they are for, and what each counts for beside them: the meshes of some scenes.
+"""
 
 
 def layout_of(model: Model) -> Layout:
     """The layout of a model, made now or for one of the same structure before."""
-    key = _key(model)
-    found = _KNOWN.pop(key, None) or Layout(model)
-    if len(found.entry) <= LARGEST:
-        _KNOWN[key] = found
-        while len(_KNOWN) > KEPT:
-            _KNOWN.popitem(last=False)
-    return found
+    return _KNOWN.found(_key(model), lambda: Layout(model), lambda layout: EACH + len(layout.entry))
 
 
-_KNOWN: OrderedDict[Any, Layout] = OrderedDict()
+_KNOWN: Recent[Layout] = Recent(ROOM, EACH + LARGEST)
 
 
 def _key(model: Model) -> Any:

@@ -15,9 +15,9 @@ Source: Barraco and Munteanu, Part 1, section 1 (the two ways of assembling).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from ..description.scene import Scene
 from ..description.supports import drives
 from ..errors import SceneError
 from ..mathematics.arrays import Array, Index, normals, numbers, unit
+from ..mathematics.keeping import Recent
 from ..mathematics.linear import SparseMap
 from .mesh import Mesh
 from .segments import Segments
@@ -73,8 +74,22 @@ def _slides(scene: Scene, name: str) -> bool:
     return node.slides and not any(drives(node, displacement) for displacement in moved)
 
 
+ROOM, LARGEST, EACH = 128_000, 2_000, 200
+"""Places and segments of all maps together that are kept for models of the same structure, those of the largest, and
+what each counts for beside them.
+"""
+
 Source = tuple[str, int]
 """What a displacement depends on: the chord (E), unknowns (Y) or prescribed displacement (B) of a number."""
+
+
+def _guide(scene: Scene, name: str) -> tuple[float, ...]:
+    """Unit vector along the guide of a node."""
+    direction, axes = numbers(scene.nodes[name].direction), 2 if scene.resolved_dimension == "plane" else 3
+    if hasattr(direction, "expression"):
+        message = "found a guide that turns with parameters, accepted: one that stays, as unknowns go along it"
+        raise SceneError(message, ("nodes", name, "direction"))
+    return tuple(unit(direction[:axes]).tolist())
 
 
 @dataclass
@@ -83,37 +98,53 @@ class _Place:
 
     terms: dict[Source, Array] = field(default_factory=dict)
 
-    def plus(self, other: _Place, sign: float = 1.0) -> _Place:
+    def plus(self, other: _Place) -> _Place:
         # What is not added to is shared, not copied: far places of a chain have many terms.
         terms = dict(self.terms)
         for source, matrix in other.terms.items():
-            signed = matrix if sign == 1.0 else sign * matrix
-            total = terms[source] + signed if source in terms else signed
+            total = terms[source] + matrix if source in terms else matrix
             terms[source] = total
             if not total.any():
                 del terms[source]
         return _Place(terms)
 
-    def times(self, matrix: Array) -> _Place:
-        return _Place({source: matrix @ term for source, term in self.terms.items()})
+
+class _Products:
+    """Products of matrices, each of which is made once: equal entries of maps are then one matrix."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[int, int], tuple[Array, Array, Array]] = {}
+
+    def times(self, matrix: Array, place: _Place) -> _Place:
+        """A matrix times a place."""
+        return _Place({source: self._product(matrix, term) for source, term in place.terms.items()})
+
+    def _product(self, a: Array, b: Array) -> Array:
+        key = (id(a), id(b))
+        if key not in self._known:
+            # Kept with their product, so that no others have their identities.
+            self._known[key] = (a, b, a @ b)
+        return self._known[key][2]
 
 
 class _Placing:
     """The places while they are found one after the other."""
 
-    def __init__(self, scene: Scene, segments: Segments, axes: int, closing: bool, bodies: Mapping[str, int]) -> None:
-        self.scene, self.segments, self.axes, self.bodies = scene, segments, axes, bodies
-        self.eye = np.eye(axes)
+    def __init__(self, structure: _Structure, closing: bool) -> None:
+        self.segments, self.axes, self.bodies = structure.segments, structure.axes, structure.bodies
+        self.guides = {name: np.array(guide) for name, guide in structure.guides.items()}
+        self.eye, self._products = np.eye(self.axes), _Products()
+        self._minus, self._rows = -self.eye, [row[None, :] for row in self.eye]
+        self._columns: dict[tuple[int, ...], Array] = {}
         self.labels: list[str] = []
         self.rows: list[tuple[str, _Place]] = []
         self.closes: list[int] = []
         self.places: dict[str, _Place] = {}
-        self.retained = np.full((len(segments.places), axes), -1, dtype=np.intp)
-        self.number = {name: i for i, name in enumerate(segments.places)}
-        self.free = {n for n in segments.places if n not in scene.nodes or scene.nodes[n].support == "free"}
-        self.sliding = {n for n in scene.nodes if _slides(scene, n)}
-        self._touching: dict[str, list[int]] = {n: [] for n in segments.places}
-        for i, part in enumerate(segments.parts):
+        self.retained = np.full((len(self.segments.places), self.axes), -1, dtype=np.intp)
+        self.number = {name: i for i, name in enumerate(self.segments.places)}
+        self.free, self.sliding = set(self.segments.places) - structure.held, set(self.guides)
+        self._touching: dict[str, list[int]] = {n: [] for n in self.segments.places}
+        for i, part in enumerate(self.segments.parts):
             self._touching[part.start].append(i)
             self._touching[part.end].append(i)
         self._used: set[int] = set()
@@ -137,8 +168,8 @@ class _Placing:
         within = self._loops_within_bodies()
         for i, part in enumerate(self.segments.parts):
             if i not in self._used | within:
-                gap = self.places[part.start].plus(self._chord(i)).plus(self.places[part.end], -1.0)
-                self._close(gap, [f"closing of {part.member}, {c}" for c in "xyz"[: self.axes]], self.eye, i)
+                gap = self.places[part.start].plus(self._chord(i)).plus(self._negative(self.places[part.end]))
+                self._close(gap, [f"closing of {part.member}, {c}" for c in "xyz"[: self.axes]], self._rows, i)
 
     def _loops_within_bodies(self) -> set[int]:
         """Segments that close a loop of rigid members that share one rotation: it stays closed by itself."""
@@ -161,12 +192,8 @@ class _Placing:
                 found.add(i)
         return found
 
-    def _guide(self, name: str) -> Array:
-        direction = numbers(self.scene.nodes[name].direction)
-        if hasattr(direction, "expression"):
-            message = "found a guide that turns with parameters, accepted: one that stays, as unknowns go along it"
-            raise SceneError(message, ("nodes", name, "direction"))
-        return unit(direction[: self.axes])
+    def _negative(self, place: _Place) -> _Place:
+        return self._products.times(self._minus, place)
 
     def _prescribed(self, name: str) -> _Place:
         return _Place({("B", self.number[name]): self.eye})
@@ -179,7 +206,7 @@ class _Placing:
         first = len(self.labels)
         if name in self.sliding:
             self.labels.append(f"travel of {name}")
-            return self._prescribed(name).plus(_Place({("Y", first): self._guide(name)[:, None]}))
+            return self._prescribed(name).plus(_Place({("Y", first): self.guides[name][:, None]}))
         self.labels += [f"{name}.{c}" for c in "xyz"[: self.axes]]
         return _Place({("Y", first): self.eye})
 
@@ -187,10 +214,13 @@ class _Placing:
         """A place by its components; on a guide with the equations that keep it there."""
         first = len(self.labels)
         if name in self.segments.strained:
-            chosen = list(self.segments.strained[name])
-            self.retained[self.number[name], chosen] = first + np.arange(len(chosen))
+            chosen = tuple(self.segments.strained[name])
+            for i, component in enumerate(chosen):
+                self.retained[self.number[name], component] = first + i
             self.labels += [f"{name}, {component}" for component in self.segments.strained[name].values()]
-            self.places[name] = _Place({("Y", first): self.eye[:, chosen]})
+            if chosen not in self._columns:
+                self._columns[chosen] = self.eye[:, chosen]
+            self.places[name] = _Place({("Y", first): self._columns[chosen]})
             return
         self.retained[self.number[name]] = first + np.arange(self.axes)
         self.labels += [f"{name}.{c}" for c in "xyz"[: self.axes]]
@@ -200,15 +230,14 @@ class _Placing:
 
     def _across(self, name: str, found: _Place) -> _Place:
         """Rows that keep a place on its guide; its displacement along it."""
-        gap = found.plus(self._prescribed(name), -1.0)
-        across = normals(self._guide(name))
+        gap, guide = found.plus(self._negative(self._prescribed(name))), self.guides[name]
+        across = [row[None, :] for row in normals(guide)]
         self._close(gap, [f"{name} across its guide"] * len(across), across)
-        along = self._guide(name)[:, None] @ self._guide(name)[None, :]
-        return self._prescribed(name).plus(gap.times(along))
+        return self._prescribed(name).plus(self._products.times(guide[:, None] @ guide[None, :], gap))
 
-    def _close(self, gap: _Place, names: list[str], directions: Array, segment: int = -1) -> None:
+    def _close(self, gap: _Place, names: list[str], directions: Iterable[Array], segment: int = -1) -> None:
         for name, direction in zip(names, directions, strict=True):
-            self.rows.append((name, gap.times(direction[None, :])))
+            self.rows.append((name, self._products.times(direction, gap)))
             self.closes.append(segment)
 
     def _spread(self, front: list[str]) -> None:
@@ -220,7 +249,8 @@ class _Placing:
                 if i in self._used or there in self.places:
                     continue
                 self._used.add(i)
-                found = self.places[here].plus(self._chord(i), 1.0 if here == part.start else -1.0)
+                chord = self._chord(i) if here == part.start else self._negative(self._chord(i))
+                found = self.places[here].plus(chord)
                 self.places[there] = self._across(there, found) if there in self.sliding else found
                 front.append(there)
 
@@ -261,12 +291,56 @@ def place_nodes(
     number of the rotation of each rigid member.  A loop within one rigid body has no closing equation: the force around
     it is indeterminate, and the last member is taken to carry none.
     """
-    names: tuple[Assembly, ...] = ("closing", "nodal") if assembly == "auto" else (assembly,)
-    both = {name: _Placing(scene, segments, axes, name == "closing", bodies) for name in names}
-    if assembly == "auto":
-        closing, nodal = (_entries(both[name], mesh) for name in ("closing", "nodal"))
-        assembly = "closing" if closing <= nodal else "nodal"
-    return _positions(both[assembly]), assembly
+    guides = {name: _guide(scene, name) for name in scene.nodes if _slides(scene, name)}
+    held = frozenset(name for name, node in scene.nodes.items() if node.support != "free")
+    structure = _Structure(segments, axes, dict(bodies), guides, held, mesh.order, assembly)
+    return _KNOWN.found(structure.key, structure.placed, lambda _: structure.size)
+
+
+@dataclass(frozen=True, eq=False)
+class _Structure:
+    """Everything that the maps are made of: of ``segments`` what :attr:`key` has, unit vectors along guides, nodes that
+    supports hold or guide, and what :func:`place_nodes` is given.
+    """
+
+    segments: Segments
+    axes: int
+    bodies: Mapping[str, int]
+    guides: Mapping[str, tuple[float, ...]]
+    held: frozenset[str]
+    order: int
+    assembly: Assembly
+
+    @property
+    def key(self) -> Any:
+        """What distinguishes it from others."""
+        segments, strained = self.segments, self.segments.strained
+        parts = tuple((p.member, p.elements.start, p.elements.stop, p.start, p.end) for p in segments.parts)
+        components = tuple((name, tuple(own.items())) for name, own in strained.items())
+        given = (
+            self.axes,
+            tuple(self.bodies.items()),
+            tuple(self.guides.items()),
+            self.held,
+            self.order,
+            self.assembly,
+        )
+        return segments.places, segments.retained, parts, components, *given
+
+    @property
+    def size(self) -> int:
+        """What the maps count for among those that are kept."""
+        return EACH + len(self.segments.places) + len(self.segments.parts)
+
+    def placed(self) -> tuple[Positions, Assembly]:
+        """The maps, and the assembly that they are of."""
+        assembly = self.assembly
+        names: tuple[Assembly, ...] = ("closing", "nodal") if assembly == "auto" else (assembly,)
+        both = {name: _Placing(self, name == "closing") for name in names}
+        if assembly == "auto":
+            closing, nodal = (_entries(both[name], self.order) for name in ("closing", "nodal"))
+            assembly = "closing" if closing <= nodal else "nodal"
+        return _positions(both[assembly]), assembly
 
 
 def _positions(placing: _Placing) -> Positions:
@@ -286,9 +360,12 @@ def _positions(placing: _Placing) -> Positions:
     )
 
 
-def _entries(placing: _Placing, mesh: Mesh) -> int:
+def _entries(placing: _Placing, order: int) -> int:
     """Number of entries that closing rows and displacement unknowns add to the Newton matrix, for ``auto``."""
     parts = placing.segments.parts
     touched = ({number for kind, number in gap.terms if kind == "E"} for _, gap in placing.rows)
     count = sum(parts[i].elements.stop - parts[i].elements.start for row in touched for i in row)
-    return count * mesh.order + 4 * len(placing.labels)
+    return count * order + 4 * len(placing.labels)
+
+
+_KNOWN: Recent[tuple[Positions, Assembly]] = Recent(ROOM, EACH + LARGEST)
