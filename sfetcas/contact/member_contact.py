@@ -608,7 +608,7 @@ class MemberContact:
 
     @staticmethod
     def _displaced(y: Array, numbers: dict[str, int], target: Model, fields: Fields) -> None:
-        """Enter how far ends of elements have moved whose places points need, into displacements (n,) by their numbers."""
+        """Enter how far ends of elements that points need have moved, into displacements (n,) by their numbers."""
         mesh, cuts = target.mesh, dict[str, set[int]]()
         for point in mesh.points:
             for side, (member, free) in enumerate(zip(point.members, point.slides, strict=True)):
