@@ -299,7 +299,7 @@ class _Looked:
         if self.scene.members[name].type == "small":
             # What acts within it acts where it would be if it did not bend.
             acting = sum(float(np.linalg.norm(entries[0], axis=1).sum()) for entries in parts[2:])
-            spare = self.step.fields.bent(name) * self.scene.center_lines[name].length * acting
+            spare = self.step.fields.bent[name] * self.scene.center_lines[name].length * acting
             moment = moment * max(0.0, 1.0 - spare / (float(np.linalg.norm(moment)) or 1.0))
         return force, moment
 

@@ -429,3 +429,29 @@ def test_loose_rows_by_inverse_iteration_are_those_of_all_singular_values(name):
     assert (name == "redundant") == bool(loose.shape[1])
     # The same space: projections onto it are equal, to the twelve digits by which it stands out.
     np.testing.assert_allclose(few @ few.T, loose @ loose.T, atol=1e-6)
+
+
+@pytest.mark.parametrize("slack", [redundancy.SLACK, redundancy.NEARLY])
+@pytest.mark.parametrize("name", [*SYSTEMS, "four_bar", "hinged_space", "redundant"])
+def test_one_vector_shows_whether_rows_of_large_models_are_loose(name, slack, monkeypatch):
+    """Also nearly loose ones: many rows and few give as many."""
+    table = redundant() if name == "redundant" else EVERY[name]()
+    equations = Equations(model_of(table, 2, 3))
+    point = equations.at(equations.start(equations.model.loading(0.0)), equations.model.loading(1.0))
+    few = redundancy.loose_rows(equations, point, slack)
+    equations.loose, sought = [], list[int]()
+    whole = redundancy._smallest
+
+    def seen(*given):
+        found = whole(*given)
+        sought.append(found[1].shape[1])
+        return found
+
+    monkeypatch.setattr(redundancy, "MANY", -1)
+    monkeypatch.setattr(redundancy, "_smallest", seen)
+    many = redundancy.loose_rows(equations, point, slack)
+    assert few.shape == many.shape
+    np.testing.assert_allclose(many @ many.T, few @ few.T, atol=1e-6)
+    # Of what is clearly apart one vector is enough, of what is loose it is not.
+    if equations.rows and slack == redundancy.SLACK:
+        assert (sought == [0]) != (name == "redundant")

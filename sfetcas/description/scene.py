@@ -296,6 +296,20 @@ class Scene(Record):
         return frozenset(run.member for runs in self.tube_runs.values() for run in runs)
 
     @property
+    def loads_along(self) -> Mapping[str, tuple[Load, ...]]:
+        """The loads along each member that has some, by name."""
+        # A copy with other loads has what this keeps, too.
+        kept = self.__dict__.get("_loads_along")
+        if kept is None or kept[0] is not self.loads:
+            found = dict[str, list[Load]]()
+            for load in self.loads.values():
+                if load.member is not None:
+                    found.setdefault(load.member, []).append(load)
+            kept = self.loads, {name: tuple(own) for name, own in found.items()}
+            self.__dict__["_loads_along"] = kept
+        return MappingProxyType(kept[1])
+
+    @property
     def started(self) -> bool:
         """Whether nodes have ``start`` places, which choose among equilibria."""
         return any(node.start is not None for node in self.nodes.values())

@@ -518,7 +518,7 @@ class Simulation:
         """Notes of small members where they bend most beyond linear elasticity."""
         if not self.superelements:
             return ()
-        worst = max(run.instants, key=lambda instant: max(map(instant.fields.bent, self.superelements)), default=None)
+        worst = max(run.instants, key=lambda instant: max(instant.fields.bent.values()), default=None)
         return (
             () if worst is None else tuple(f"at {worst.time:.6g} s {note}" for note in superelement_notes(worst.fields))
         )

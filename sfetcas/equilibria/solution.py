@@ -793,7 +793,7 @@ def superelement_notes(fields: Fields) -> tuple[str, ...]:
     notes = []
     for measure, limit, words in (
         (
-            fields.bent,
+            lambda name: fields.bent[name],
             LARGEST_DEFORMATION,
             f"bends by {{:.2g}} of its length or rad{{}}: its linear elasticity is for a few percent, and {message}",
         ),

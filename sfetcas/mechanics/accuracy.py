@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..mathematics import interpolation
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, Index
 from .displacements import Displacements
 from .fields import Fields
 from .model import Model
@@ -49,12 +49,30 @@ BLUR = 1e-12
 
 def largest_difference(coarse: Fields, fine: Fields) -> float:
     """Largest distance between positions on two meshes, at and within coarse elements, over the scene's size."""
-    largest = 0.0
-    for name, cuts in coarse.model.mesh.cuts.items():
-        x = np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * WITHIN).ravel(), cuts[-1])
-        a, b = (side.positions(name, x) for side in (coarse, fine))
-        largest = max(largest, float(np.linalg.norm(a - b, axis=1).max()))
-    return largest / coarse.model.scene.size
+    cuts = list(coarse.model.mesh.cuts.values())
+    if not cuts:
+        return 0.0
+    # Their ends, too, where members begin and end.
+    x = [np.append((own[:-1, None] + np.diff(own)[:, None] * WITHIN).ravel(), 1.0) for own in cuts]
+    sides = []
+    for side in (coarse, fine):
+        elements, xi = _located(side.model, list(coarse.model.mesh.cuts), x)
+        sides.append(side.moved_within(elements, xi) * side.model.scales.length)
+    return float(np.linalg.norm(sides[0] - sides[1], axis=1).max()) / coarse.model.scene.size
+
+
+def _located(model: Model, members: Sequence[str], x: Sequence[Array]) -> tuple[Index, Array]:
+    """Elements (n,) of a model in which fractions x of the lengths of members are, and where in these, 0 to 1."""
+    cuts = [model.mesh.cuts[name] for name in members]
+    # All members one behind the other: what is on an end of elements is so after equal shifts, too.
+    shifted = np.concatenate([own[:-1] + 2.0 * i for i, own in enumerate(cuts)])
+    asked = np.concatenate([own + 2.0 * i for i, own in enumerate(x)])
+    found = np.searchsorted(shifted, asked, side="right") - 1
+    begins, lengths = np.concatenate([own[:-1] for own in cuts]), np.concatenate([np.diff(own) for own in cuts])
+    numbers = np.concatenate(
+        [model.beams.first[name] + np.arange(len(own) - 1) for name, own in zip(members, cuts, strict=True)]
+    )
+    return numbers[found], (np.concatenate(x) - begins[found]) / lengths[found]
 
 
 def halving(coarse: Fields, fine: Fields) -> tuple[float, float]:

@@ -126,7 +126,7 @@ def quadrature(scene: Scene, name: str) -> tuple[Array, Array]:
 def _edges(scene: Scene, name: str) -> Array:
     """Ends of the panels: equal ones, and wherever the shape, the section or a load profile has a kink."""
     member, line = scene.members[name], scene.center_lines[name]
-    spread = [load for load in scene.loads.values() if load.member == name and load.type == "distributed"]
+    spread = [load for load in scene.loads_along.get(name, ()) if load.type == "distributed"]
     profiles = [load.profile for load in spread if load.profile is not None]
     kinks, even = [*line.breaks, *(kink for profile in profiles for kink in breaks(profile, line.length))], not profiles
     kinks += [end for load in spread for end in load.part]

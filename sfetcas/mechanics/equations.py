@@ -125,8 +125,8 @@ class Equations:
         self.model = model
         # Whether rows depend on each other where Newton's method began; looked for when it does.
         self.redundant: bool | None = None
-        # The last entries of the matrix for which that was asked, how exactly, and what was found.
-        self.loose: tuple[Array, float, Array] | None = None
+        # The last entries of the matrix for which that was asked, how exactly, and what was found, each time.
+        self.loose: list[tuple[Array, float, Array]] = []
         self.layout = layout = layout_of(model)
         self.tables = tables = layout.tables_of(model)
         self.row, self.column, self.diagonal = layout.row, layout.column, layout.diagonal

@@ -21,7 +21,7 @@ from ..description.tendons import Stretch
 from ..errors import SolveError, Status
 from ..mathematics import curves, quaternion
 from ..mathematics.arrays import Array, Index, first_of_largest, values_of
-from ..mathematics.interpolation import differentiation, evaluation
+from ..mathematics.interpolation import differentiation, evaluation, integration
 from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
 from .balance import three as _three
@@ -711,6 +711,30 @@ class Fields:
         moved = _three(_summed(self._stations(member, x), self.element_starts(member), gained))
         return model.scene.center_lines[member].positions(x) + moved * model.scales.length
 
+    def moved_within(self, elements: Index, xi: Array) -> Array:
+        """Displacements (n, axes), dimensionless, at places xi (n,) of elements (n,), in them from 0 to 1."""
+        values, inverse = np.unique(xi, return_inverse=True)
+        element, starts = self.model.element, self._reached[0]
+        weights = (integration(element.points, values) / element.weights)[inverse]
+        gained = (self.turned - self.model.beams.tangent)[elements]
+        return np.asarray(starts[elements] + np.einsum("nk,nka->na", weights, gained))
+
+    @functools.cached_property
+    def _reached(self) -> tuple[Array, Array]:
+        """Displacements at the starts and the ends of all elements, each (elements, axes)."""
+        model = self.model
+        steps = (self.turned - model.beams.tangent).sum(axis=1)
+        names, begins = list(model.beams.first), np.array(list(model.beams.first.values()), np.intp)
+        counts = np.diff(np.append(begins, len(steps)))
+        places = np.array([model.segments.place(model.segments.ends[name, 0]) for name in names], np.intp)
+        starts, ends = np.empty_like(steps), np.empty_like(steps)
+        for count in np.unique(counts).tolist():
+            own = counts == count
+            each, first = begins[own][:, None] + np.arange(count), self._nodal[places[own]][:, None]
+            ends[each] = first + np.cumsum(steps[each], axis=1)
+            starts[each] = np.concatenate([first, ends[each][:, :-1]], axis=1)
+        return starts, ends
+
     def rates(self, member: str, x: Array, spin: Array, known: Array) -> tuple[Array, Array]:
         """Velocity and angular velocity (n, 3) at fractions x (n,) of a flexible or rigid member's length,
         dimensionless.
@@ -860,22 +884,29 @@ class Fields:
         places = [model.segments.place(model.segments.ends[member, i]) for i in range(len(names))]
         return rest, rest + _three(self._nodal[places]) * model.scales.length
 
-    def bent(self, member: str) -> float:
-        """Deformation of a small member in its frame: largest nodal displacement over its size, or rotation, rad."""
-        model = self.model
-        rest, now = self._ends(member)
-        turned = self.state.q[list(model.rotations.ends[member])]
-        if not model.space:
-            # From the mean angle: quaternions of angles that differ by turns would not tell their mean.
-            mean = quaternion.from_rotation_vector(np.array([0.0, 0.0, turned.mean()]))
-            turned = quaternion.from_rotation_vector(np.pad(turned, ((0, 0), (2, 0))))
-        else:
-            turned = turned * np.where(turned @ turned[0] < 0.0, -1.0, 1.0)[:, None]
-            mean = turned.sum(axis=0) / np.linalg.norm(turned.sum(axis=0))
-        moved = now - now[0] - quaternion.rotate(mean, rest - rest[0])
-        spins = 2.0 * quaternion.multiply(turned, quaternion.conjugate(mean))[:, 1:]
-        size = np.linalg.norm(rest - rest[0], axis=1).max()
-        return float(max(np.linalg.norm(moved, axis=1).max() / size, np.linalg.norm(spins, axis=1).max()))
+    @functools.cached_property
+    def bent(self) -> dict[str, float]:
+        """Deformation of each small member in its frame: largest nodal displacement over its size, or rotation, rad."""
+        model, found = self.model, dict[str, float]()
+        members = {name: member for name, member in model.scene.members.items() if member.type == "small"}
+        for count in {len(member.nodes) for member in members.values()}:
+            names = [name for name, member in members.items() if len(member.nodes) == count]
+            rest, now = (np.array(places) for places in zip(*map(self._ends, names), strict=True))
+            turned = self.state.q[[model.rotations.ends[name] for name in names]]
+            if not model.space:
+                # From the mean angle: quaternions of angles that differ by turns would not tell their mean.
+                mean = quaternion.from_rotation_vector(_about_z(turned.mean(axis=1)))
+                turned = quaternion.from_rotation_vector(_about_z(turned))
+            else:
+                turned = turned * np.where((turned * turned[:, :1]).sum(axis=2) < 0.0, -1.0, 1.0)[..., None]
+                mean = turned.sum(axis=1)
+                mean /= np.linalg.norm(mean, axis=1)[:, None]
+            moved = now - now[:, :1] - quaternion.rotate(mean[:, None, :], rest - rest[:, :1])
+            spins = 2.0 * quaternion.multiply(turned, quaternion.conjugate(mean)[:, None, :])[..., 1:]
+            sizes = np.linalg.norm(rest - rest[:, :1], axis=2).max(axis=1)
+            far = np.linalg.norm(moved, axis=2).max(axis=1) / sizes
+            found |= dict(zip(names, np.maximum(far, np.linalg.norm(spins, axis=2).max(axis=1)).tolist(), strict=True))
+        return {name: found[name] for name in members}
 
     def beyond_limits(self) -> SolveError | None:
         """Why a state is beyond what its scene describes; None where it is not.
@@ -911,7 +942,7 @@ class Fields:
 
     def _bent_far(self) -> str:
         """A sentence on the small member deformed most, where its linear elasticity is meaningless; else empty."""
-        superelements = {name: self.bent(name) for name, m in self.model.scene.members.items() if m.type == "small"}
+        superelements = self.bent
         worst = [*superelements, ""][first_of_largest(np.array([*superelements.values(), 0.0]))]
         if not superelements.get(worst, 0.0) > LARGE:
             return ""
@@ -946,11 +977,8 @@ class Fields:
     @kept(MEMBERS)
     def element_starts(self, member: str) -> Array:
         """Displacement at the start of each element of a member (and its end)."""
-        model = self.model
-        part = model.elements_of(member)
-        first = self._nodal[model.segments.place(model.segments.ends[member, 0])]
-        steps = (self.turned[part] - model.beams.tangent[part]).sum(axis=1)
-        return np.asarray(first + np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)]))
+        starts, ends = (reached[self.model.elements_of(member)] for reached in self._reached)
+        return np.concatenate([starts, ends[-1:]])
 
     @kept(MEMBERS)
     def _element_moments(self, member: str) -> Array:
@@ -977,6 +1005,11 @@ class Fields:
             # A string gives couples that no loading knows: the elements say what reaches them.
             moments[:-1] = -self.balance.starting_moments(part) - _cross(self.turned[part, 0], strings)
         return np.asarray(moments)
+
+
+def _about_z(angles: Array) -> Array:
+    """Rotation vectors (..., 3) about z by angles (..., 1)."""
+    return np.concatenate([np.zeros((*angles.shape[:-1], 2)), angles], axis=-1)
 
 
 def _summed(at: Stations, starts: Array, gained: Array) -> Array:

@@ -421,10 +421,9 @@ def breaks_of(scene: Scene, member: str) -> Array:
     places = [0.0, 1.0, *scene.center_lines[member].breaks]
     if section is not None:
         places += scene.sections[section].breaks
-    for load in scene.loads.values():
-        if load.member == member:
-            places += list(load.part) if load.type == "distributed" else [] if load.at is None else [load.at]
-            places += [] if load.profile is None else list(kinks(load.profile, scene.center_lines[member].length))
+    for load in scene.loads_along.get(member, ()):
+        places += list(load.part) if load.type == "distributed" else [] if load.at is None else [load.at]
+        places += [] if load.profile is None else list(kinks(load.profile, scene.center_lines[member].length))
     for table in (scene.actuations, scene.magnets):
         for acting in table.values():
             places += acting.breaks if acting.member == member else ()
@@ -529,7 +528,7 @@ elements that are much shorter than those beside them are slivers."""
 
 def _formulas(scene: Scene, member: str) -> list[Formula]:
     """Formulas of the section of a member and of what acts along it."""
-    loads = [load.profile for load in scene.loads.values() if load.member == member]
+    loads = [load.profile for load in scene.loads_along.get(member, ())]
     loads += [one.profile for one in scene.actuations.values() if one.member == member]
     loads += [one.profile for one in scene.magnets.values() if one.member == member]
     section = scene.sections.get(str(scene.members[member].section))

@@ -287,7 +287,7 @@ def _retained_cuts(scene: Scene, mesh: Mesh, member: str) -> list[int]:
     inner = range(1, len(cuts) - 1)
     if member in _pushed(scene):
         return list(inner)
-    following = [load for load in scene.loads.values() if load.member == member and load.follows]
+    following = [load for load in scene.loads_along.get(member, ()) if load.follows]
     spread = [load.part for load in following if load.type == "distributed"]
     wanted = {cut for a, b in spread for cut in range(_nearest(cuts, a), _nearest(cuts, b) + 1)}
     wanted |= {_nearest(cuts, load.at or 0.0) for load in following if load.type != "distributed"}

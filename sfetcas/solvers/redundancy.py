@@ -39,10 +39,13 @@ def loose_rows(equations: Equations, point: Point, slack: float | None = None) -
     slack = SLACK if slack is None else slack
     if not equations.rows:
         return np.zeros((0, 0))
-    # A step and what is left after it ask for the same.
-    if equations.loose is None or equations.loose[0] is not point.entries or equations.loose[1] != slack:
-        equations.loose = (point.entries, slack, _loose_rows(equations, point, slack))
-    return equations.loose[2]
+    # A step and what is left after it ask for the same, and much is asked of the undeformed state.
+    for entries, known, found in equations.loose:
+        if known == slack and (entries is point.entries or np.array_equal(entries, point.entries)):
+            return found
+    found = _loose_rows(equations, point, slack)
+    equations.loose = [(point.entries, slack, found), *equations.loose[: ASKED - 1]]
+    return found
 
 
 def _loose_rows(equations: Equations, point: Point, slack: float) -> Array:
@@ -50,7 +53,7 @@ def _loose_rows(equations: Equations, point: Point, slack: float) -> Array:
     # Without beams rows are of the size of one.
     usual = float((equations.model.beams.weight**2).sum()) or 1.0
     if equations.rows > MANY:
-        squares, left, largest = _smallest(equations, point)
+        squares, left, largest = _smallest(equations, point, APART * slack**2, usual)
     else:
         products = _products(equations, point)
         if _clearly_independent(products, usual):
@@ -105,27 +108,33 @@ def _clearly_independent(products: Array, usual: float) -> bool:
     return bool((sizes > 0.0).all() and ROUGHLY * max(float(products.trace()), usual) * float(sizes.sum()) < 1.0)
 
 
-def _smallest(equations: Equations, point: Point) -> tuple[Array, Array, float]:
+def _smallest(
+    equations: Equations, point: Point, apart: float = np.inf, usual: float = 0.0
+) -> tuple[Array, Array, float]:
     """As :func:`_all_singular` for the smallest singular values only, by inverse iteration with the sparse Jacobian.
 
-    The largest sum of squares of a row stands for the largest square.
+    The largest sum of squares of a row stands for the largest square.  None are given where the least square is above
+    the share ``apart`` of that, or of a ``usual`` one: as one vector shows, since one far below it would outgrow all
+    others in it at once.
     """
     n = equations.unknowns
     entries = equations.of_rows(point.entries)
     largest = float(np.bincount(equations.row, weights=entries**2, minlength=equations.total)[n:].max())
     equations.solver.factor(equations.regularised(entries, np.ones(n), TINY_SHARE * largest))
-    count = 8
+    count = 1
     while True:
         block = np.random.default_rng(0).standard_normal((equations.total, min(count, equations.rows)))
-        for _ in range(INVERSE):
+        for _ in range(INVERSE if count > 1 else FIRST):
             block[:n] = 0.0
             block[n:] = np.linalg.qr(block[n:])[0]
             block = equations.solver.solve(block)
         left, sizes, _ = np.linalg.svd(block[n:], full_matrices=False)
         squares = 1.0 / sizes - TINY_SHARE * largest
-        if squares.max() > SLACK * largest or count >= equations.rows:
+        if count == 1 and squares[0] > apart * max(largest, usual):
+            return squares[:0], left[:, :0], largest
+        if count > 1 and (squares.max() > SLACK * largest or count >= equations.rows):
             return squares[::-1], left[:, ::-1], largest
-        count *= 4
+        count = 4 * count if count > 1 else BLOCK
 
 
 ROUGHLY = 1e-4
@@ -134,8 +143,16 @@ ROUGHLY = 1e-4
 MANY = 300
 """Number of rows above which only the smallest singular values are computed."""
 
-INVERSE = 3
-"""Inverse iterations; few suffice as the squares of loose rows are smaller by twelve digits."""
+INVERSE, FIRST, BLOCK = 3, 2, 8
+"""Inverse iterations, and those of a single vector; few suffice as the squares of loose rows are smaller by twelve
+digits; vectors at first.
+"""
+
+APART = 1e4
+"""Ratio of the least square to the one below which rows are loose, from which on none are."""
+
+ASKED = 4
+"""States of which is remembered which rows are loose there."""
 
 TINY_SHARE = 1e-15
 """Dual regularisation of the matrix of redundant rows, share of the largest square."""
