@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,47 +132,56 @@ def _heaviest(scene: Scene) -> float:
 
 def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beams:
     """Data of the elements of all members; small members have no elements."""
-    stiffness, tangent, weight, compliance = [], [], [], []
-    size = element.compliances
-    first: dict[str, int] = {}
-    count = 0
-    for name, member in scene.members.items():
-        if member.type == "small":
-            continue
-        cuts, line = mesh.cuts[name], scene.center_lines[name]
-        x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.points
-        length = line.length / scales.length * np.diff(cuts)
-        w = length[:, None] * element.weights
-        values = np.zeros((x.size, 3))
-        if member.type == "flexible":
-            section = scene.sections[str(member.section)]
-            coupled = element.space and section.coupled
-            values = section.stiffness_matrix(x.ravel()) if coupled else section.stiffness(x.ravel())
-            values = values / (scales.moment * scales.length)
-        frames = quaternion.matrix(line.quaternions(x.ravel()))
-        # Integrals over xi of squares of derivatives by xi: weight over length.
-        per_length = (element.weights / length[:, None])[..., None]
-        stiffness.append(in_fixed_axes(values, frames, element, line.bending_axis).reshape(*x.shape, -1) * per_length)
-        tangent.append(frames[:, : element.axes, 0].reshape(*x.shape, -1) * w[..., None])
-        weight.append(w)
-        compliance.append(np.zeros((*x.shape, size)))
-        if element.yielding and (member.stretches(scene.sections) or member.shifted(scene.sections)):
-            columns = _columns(scene, name, x.ravel(), frames, element, scales, w.ravel())
+    members = {name: member for name, member in scene.members.items() if member.type != "small"}
+    lengths = {name: scene.center_lines[name].length / scales.length * np.diff(mesh.cuts[name]) for name in members}
+    along = {name: (c := mesh.cuts[name])[:-1, None] + np.diff(c)[:, None] * element.points for name in members}
+    counts, n = [len(own) for own in lengths.values()], element.order + 1
+    first = dict(zip(members, np.cumsum([0, *counts])[:-1].tolist(), strict=True))
+    length = np.concatenate([np.zeros(0), *lengths.values()])
+    weight = length[:, None] * element.weights
+    turned = [np.zeros((0, 4)), *(scene.center_lines[name].quaternions(x.ravel()) for name, x in along.items())]
+    frames = quaternion.matrix(np.concatenate(turned))
+    # Integrals over xi of squares of derivatives by xi: weight over length.
+    per_length = (element.weights / length[:, None])[..., None]
+    stiffness = _stiffness(scene, along, frames, element, scales.moment * scales.length)
+    compliance, begin = [np.zeros((0, n, element.compliances))], 0
+    for name, x in along.items():
+        own = slice(begin, begin + x.size)
+        begin += x.size
+        compliance.append(np.zeros((*x.shape, element.compliances)))
+        if element.yielding and (members[name].stretches(scene.sections) or members[name].shifted(scene.sections)):
+            w = weight[first[name] : first[name] + len(x)].ravel()
+            columns = _columns(scene, name, x.ravel(), frames[own], element, scales, w)
             compliance[-1] = columns.transpose(0, 2, 1).reshape(*x.shape, -1)
-        first[name] = count
-        count += len(w)
-    n = element.order + 1
-    stiffness.append(np.zeros((0, n, element.stiffnesses)))
-    tangent.append(np.zeros((0, n, element.axes)))
-    weight.append(np.zeros((0, n)))
-    compliance.append(np.zeros((0, n, size)))
     return Beams(
-        stiffness=np.concatenate(stiffness),
-        tangent=np.concatenate(tangent),
-        weight=np.concatenate(weight),
+        stiffness=stiffness.reshape(-1, n, element.stiffnesses) * per_length,
+        tangent=frames[:, : element.axes, 0].reshape(-1, n, element.axes) * weight[..., None],
+        weight=weight,
         compliance=np.concatenate(compliance),
         first=first,
     )
+
+
+def _stiffness(scene: Scene, along: Mapping[str, Array], frames: Array, element: Element, unit: float) -> Array:
+    """Stiffness (points, numbers), over a unit, N m2, of members at fractions of their lengths, in the fixed axes.
+
+    Sections are asked once for all of their members; what is rigid has none.
+    """
+    members, shared = scene.members, dict[tuple[str, int], list[str]]()
+    for name in along:
+        if members[name].type == "flexible":
+            axis = 0 if element.space else scene.center_lines[name].bending_axis
+            shared.setdefault((str(members[name].section), axis), []).append(name)
+    found = {name: np.zeros((x.size, element.stiffnesses)) for name, x in along.items()}
+    begins = dict(zip(along, np.cumsum([0, *(x.size for x in along.values())]).tolist(), strict=False))
+    for (key, axis), names in shared.items():
+        section, x = scene.sections[key], np.concatenate([along[name].ravel() for name in names])
+        values = section.stiffness_matrix(x) if element.space and section.coupled else section.stiffness(x)
+        own = np.concatenate([begins[name] + np.arange(along[name].size) for name in names])
+        turned = in_fixed_axes(values / unit, frames[own], element, axis)
+        ends = np.cumsum([0, *(along[name].size for name in names)]).tolist()
+        found |= {name: turned[a:b] for name, (a, b) in zip(names, itertools.pairwise(ends), strict=True)}
+    return np.concatenate([np.zeros((0, element.stiffnesses)), *found.values()])
 
 
 def _columns(

@@ -39,9 +39,10 @@ def loose_rows(equations: Equations, point: Point, slack: float | None = None) -
     slack = SLACK if slack is None else slack
     if not equations.rows:
         return np.zeros((0, 0))
-    # A step and what is left after it ask for the same, and much is asked of the undeformed state.
+    # A step and what is left after it ask for the same; of large models much is asked of the undeformed state.
+    many = equations.rows > MANY
     for entries, known, found in equations.loose:
-        if known == slack and (entries is point.entries or np.array_equal(entries, point.entries)):
+        if known == slack and (entries is point.entries or (many and np.array_equal(entries, point.entries))):
             return found
     found = _loose_rows(equations, point, slack)
     equations.loose = [(point.entries, slack, found), *equations.loose[: ASKED - 1]]
