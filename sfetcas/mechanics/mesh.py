@@ -14,7 +14,7 @@ from .. import tolerances
 from ..description.formulas import Formula
 from ..description.records import brief, counted
 from ..description.scene import Scene, check_scene
-from ..description.sections import FINE
+from ..description.sections import FINE, CrossSection
 from ..description.sections import breaks as kinks
 from ..description.showing import first_lines, shown
 from ..description.tendons import kinks_along
@@ -500,25 +500,33 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
     check_scene(scene, "first_mesh({}, ...)")
     rotations = [np.linalg.norm(m.rotation) for m in scene.motions.values() if m.rotation is not None]
     reaching, follows = carried(scene), any(load.follows for load in scene.loads.values())
-    cuts = {}
+    cuts, middle = {}, np.linspace(0.0, 1.0, 5)
+    soft = {name: float(np.nanmin(one.stiffness(middle))) for name, one in _bent_by(scene).items()}
     for name in cut(scene):
         line, section = scene.center_lines[name], scene.sections.get(str(scene.members[name].section))
         if scene.members[name].type == "rigid" or section is None:
             cuts[name] = rigid_cuts(scene, name)
             continue
         most = reaching[name].force + magnetic(scene, name)
-        softest = float(np.nanmin(section.stiffness(np.linspace(0.0, 1.0, 5))))
+        softest = soft[str(scene.members[name].section)]
         expected = line.turning + max(rotations, default=0.0) + reaching[name].moment * line.length / softest
         expected += natural_turning(scene, name)
         # What turns with its load may bend to and fro all along; waves are as long as the layers are thick.
         waves = line.length * np.sqrt(most / softest) if follows else 0.0
         count = int(min(max(2.0, np.ceil((expected + waves) / turning)), 2000.0))
         layer = np.sqrt(softest / most) / line.length if most > 0.0 else np.inf
-        cuts[name] = _graded(_divided(breaks_of(scene, name), count), breaks_of(scene, name), layer)
+        breaks = breaks_of(scene, name)
+        cuts[name] = _graded(_divided(breaks, count), breaks, layer)
         edges = [x for formula in _formulas(scene, name) for x in formula.edges(line.length)]
         beside = np.array([np.abs(cuts[name] - x).min() for x in edges])
         cuts[name] = np.unique([*cuts[name], *np.array(edges)[beside > NEXT]])
     return Mesh(order, cuts, rigid=rigid(scene))
+
+
+def _bent_by(scene: Scene) -> dict[str, CrossSection]:
+    """The sections of flexible members, by name."""
+    used = {str(member.section) for member in scene.members.values() if member.type == "flexible"}
+    return {name: scene.sections[name] for name in sorted(used)}
 
 
 NEXT = 1e-3

@@ -68,18 +68,22 @@ class Sides:
         lines = model.scene.center_lines
         about = np.flatnonzero(model.rotations.kind == RotationFreedom.AXIS) if model.space else ()
         vectors, shares = np.zeros((len(model.rotations.kind), 3)), np.zeros(len(model.rotations.kind))
-        way = np.array([0.0, 0.0, 1.0])
-        for place, name in enumerate(sorted(model.rotations.ends)):
-            ends = list(model.rotations.ends[name])
-            chain = model.chain(name) if name in model.members else np.array(ends)
-            along = model.along(name) if name in model.members else np.linspace(0.0, 1.0, len(ends))
+        rank = {name: place for place, name in enumerate(sorted(model.rotations.ends))}
+        for names, chains, along in self._chains:
+            ways = np.tile([0.0, 0.0, 1.0], (len(names), 1))
             if model.space:
-                way = quaternion.matrix(lines[name].quaternions(np.array([0.0])))[0][:, axis]
+                begins = np.concatenate([lines[name].quaternions(np.array([0.0])) for name in names])
+                ways = quaternion.matrix(begins)[:, :, axis]
+            sizes = np.array([lines[n].length * (1.0 if n in model.beams.first else WITHOUT_ELEMENTS) for n in names])
             # At a node of several members the mean, weighted by the length that the node stands for in each:
             # integrals are then the same on all meshes, also of a field that jumps there.
-            share = np.gradient(along) * lines[name].length * (1.0 if name in model.members else WITHOUT_ELEMENTS)
-            vectors[chain] += (share * np.exp(-decay * along))[:, None] * way / (1.0 + place)
-            shares[chain] += share
+            share = np.gradient(along, axis=1) * sizes[:, None]
+            ranked = ways / (1.0 + np.array([rank[name] for name in names]))[:, None]
+            # What has one rotation has it once.
+            once = np.array([chain[:-1] != last for chain, last in zip(chains, chains[:, -1], strict=True)])
+            once = np.column_stack([once, np.ones(len(names), bool)])
+            np.add.at(vectors, chains[once], ((share * np.exp(-decay * along))[..., None] * ranked[:, None])[once])
+            np.add.at(shares, chains[once], share[once])
         vectors /= np.where(shares > 0.0, shares, 1.0)[:, None]
         values = vectors if model.space else vectors[:, 2:3]
         if len(about):
@@ -89,6 +93,21 @@ class Sides:
         used = equations.number >= 0
         field[equations.number[used]] = values[used]
         return field
+
+    @functools.cached_property
+    def _chains(self) -> list[tuple[list[str], Index, Array]]:
+        """Members with chains of the same number of nodes: names, rotations and fractions of the length (names, n)."""
+        model, found = self._equations.model, dict[int, list[tuple[str, Index, Array]]]()
+        for name, ends in model.rotations.ends.items():
+            if name in model.beams.first:
+                one = name, model.chain(name), model.along(name)
+            else:
+                one = name, np.array(ends), np.linspace(0.0, 1.0, len(ends))
+            found.setdefault(len(one[1]), []).append(one)
+        return [
+            ([name for name, *_ in own], np.array([chain for _, chain, _ in own]), np.array([x for *_, x in own]))
+            for own in found.values()
+        ]
 
     @functools.cached_property
     def displacing(self) -> tuple[Array, ...]:
