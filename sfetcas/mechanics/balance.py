@@ -16,7 +16,6 @@ from ..mathematics.arrays import Array
 from ..mathematics.keeping import kept
 from .batches import GroupBatch
 from .connections import connections_of
-from .contact_lines import Pressed
 from .equations import Equations, State
 from .loading import Loading
 from .segments import elongation_of
@@ -207,7 +206,7 @@ class Balance:
         found: dict[str, dict[str, float]] = {}
         for number, group in enumerate(self.model.connections):
             units = group.kind.answers if group.kind.table == table else {}
-            if units and not isinstance(group.kind, Pressed):
+            if units and group.kind.largest_at is None:
                 sizes = np.array([self.model.scales.of(unit) for unit in units.values()])
                 rows = dict(zip(group.names[::-1], (self._answers(number) * sizes).tolist()[::-1], strict=True))
                 for name, row in rows.items():
@@ -219,14 +218,13 @@ class Balance:
         """Of each end of elements on a line, by the name of its point, push and friction where there is any (1 or 2,
         elements, points, 3) N at the points of the elements beside it.
         """
-        found: dict[bool, dict[str, Array]] = {True: {}, False: {}}
+        falling, rising = found = dict[str, Array](), dict[str, Array]()
+        points = len(self.model.element.points)
         for number, group in enumerate(self.model.connections):
-            kind = group.kind
-            if isinstance(kind, Pressed):
+            if group.kind.largest_at is not None:
                 forces = self._answers(number) * self.model.scales.force
-                forces = forces.reshape(len(forces), 2 if kind.rough else 1, 1, -1, 3)
-                found[kind.rising] |= dict(zip(group.names, forces, strict=True))
-        rising, falling = found[True], found[False]
+                forces = forces.reshape(len(forces), -1, 1, points, 3)
+                found[group.kind.largest_at].update(zip(group.names, forces, strict=True))
         both = {name: np.concatenate([rising[name], falling[name]], axis=1) for name in rising.keys() & falling.keys()}
         return rising | falling | both
 

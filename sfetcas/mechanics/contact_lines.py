@@ -129,6 +129,11 @@ class Pressed(Term):
         return self.carried
 
     @property
+    def largest_at(self) -> int:
+        """The end of elements that it belongs to."""
+        return int(self.rising)
+
+    @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """The rotations of the element, its places; a row for each mean."""
         turns, strains, *_ = self.element.sizes

@@ -148,6 +148,13 @@ class Term(Components, abc.ABC):
         return "middle"
 
     @property
+    def largest_at(self) -> int | None:
+        """The end of its element, 0 or 1, towards which forces rise that it spreads along it, and which at the points
+        are its :meth:`answer`: those across what it touches, then those along; None where it spreads none.
+        """
+        return None
+
+    @property
     def vectors(self) -> int:
         """How many vectors its rows begin with that have momentum, centrifugal and Coriolis forces."""
         return 0
