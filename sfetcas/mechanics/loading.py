@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -94,17 +94,23 @@ class Loading:
     @staticmethod
     def combined(parts: Sequence[tuple[Loading, float]]) -> Loading:
         """The sum of loadings, each times a factor."""
-        first, found = parts[0][0], dict[str, Any]()
+        first, found, loads = parts[0][0], dict[str, Any](), list(parts[0][0].loads)
         # What is zero is left out: of most loadings all but one or two parts.
-        for name in (*LOADS, *MOTIONS):
+        names = frozenset[str]().union(*(one._parts for one, _ in parts))
+        numbers = frozenset[int]().union(*(one._loaded for one, _ in parts))
+        for name in names:
             terms = [factor * getattr(one, name) for one, factor in parts if name in one._parts]
-            found[name] = sum(terms[1:], terms[0]) if terms else getattr(first, name)
-        loads = list[Array]()
-        for i, load in enumerate(first.loads):
+            found[name] = sum(terms[1:], terms[0])
+        for i in numbers:
             terms = [factor * one.loads[i] for one, factor in parts if i in one._loaded]
-            loads.append(sum(terms[1:], terms[0]) if terms else load)
+            loads[i] = sum(terms[1:], terms[0])
         total = sum(factor * one.factor for one, factor in parts)
-        return replace(first, **found, loads=tuple(loads), factor=total)
+        return replace(first, **found, loads=tuple(loads), factor=total)._known(names, numbers)
+
+    def _known(self, names: frozenset[str], numbers: frozenset[int]) -> Loading:
+        """The same, of which it is known which parts and loads of groups may not be zero."""
+        self.__dict__.update(_parts=names, _loaded=numbers)
+        return self
 
     @functools.cached_property
     def _parts(self) -> frozenset[str]:
@@ -174,19 +180,24 @@ class _Sums:
 
     parts: dict[str, Array]
     loads: list[Array]
+    names: set[str] = field(default_factory=set)
+    numbers: set[int] = field(default_factory=set)
 
     def add(self, name: str, key: Any, value: Any) -> None:
         """A share of an array."""
         self.parts[name] = plus(self.parts[name], key, value)
+        self.names.add(name)
 
     def load(self, group: int, key: Any, value: Any) -> None:
         """A share of what grows in a group of connections."""
         self.loads[group] = plus(self.loads[group], key, value)
+        self.numbers.add(group)
 
     def loading(self, connections: tuple[Group, ...], factor: float) -> Loading:
         """The sum of all shares."""
         kinds = tuple(group.kind for group in connections)
-        return Loading(**self.parts, loads=tuple(self.loads), kinds=kinds, factor=factor, before=())
+        found = Loading(**self.parts, loads=tuple(self.loads), kinds=kinds, factor=factor, before=())
+        return found._known(frozenset(self.names), frozenset(self.numbers))
 
 
 @dataclass(frozen=True, eq=False)
@@ -426,16 +437,22 @@ def unit_loadings(parts: Parts, connections: tuple[Group, ...]) -> dict[str | No
     """
     scene, writer = parts.scene, _Writer(connections=connections, **vars(parts))
     groups: dict[str | None, _Sums] = {None: writer.empty()}
+
+    def of(history: str | None) -> _Sums:
+        if history not in groups:
+            groups[history] = writer.empty()
+        return groups[history]
+
     for name, load in scene.loads.items():
-        writer.add_load(groups.setdefault(load.history, writer.empty()), name, load)
+        writer.add_load(of(load.history), name, load)
     if scene.gravity is not None and any(scene.gravity):
         for member in scene.members:
             writer.add_weight(groups[None], member)
         for node in scene.nodes:
             writer.add_mass(groups[None], node)
     for name, motion in scene.motions.items():
-        writer.add_motion(groups.setdefault(motion.history, writer.empty()), name, motion)
+        writer.add_motion(of(motion.history), name, motion)
     for i, terms in enumerate(connections):
         for history, more in terms.loads.items():
-            groups.setdefault(history, writer.empty()).load(i, slice(None), more)
+            of(history).load(i, slice(None), more)
     return {history: sums.loading(connections, float(history is None)) for history, sums in groups.items()}

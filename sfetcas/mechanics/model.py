@@ -344,7 +344,7 @@ def assemble(
     scales : Scales, optional
         Units of the model; by default chosen for the scene.
     like : Model, optional
-        A model of the same scene, whose numbering is reused where only lengths of elements differ.
+        A model of the same scene, whose units are taken, and whose numbering where only lengths of elements differ.
 
     Raises
     ------
@@ -359,7 +359,7 @@ def assemble(
         mesh, assembly = replace(mesh, places=True), "nodal"
     space = scene.resolved_dimension == "space"
     element = element_by_name(f"SFET{mesh.order + 1}", space, mesh.gauss, scene.stretches, scene.shifted)
-    scales = scales or scales_of(scene)
+    scales = scales or (scales_of(scene) if like is None else like.scales)
     beams, segments = beams_of(scene, mesh, element, scales), cut_members(scene, mesh)
     if like is not None and like.element is element and like.assembly == assembly and segments.alike(like.segments):
         rotations, positions = like.rotations, like.positions
