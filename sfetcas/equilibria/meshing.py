@@ -71,6 +71,11 @@ class EquilibriumResult:
         """On the mesh where it was found first: finer meshes do not repeat the test before the answer."""
         return (self.found or self.solved).stability
 
+    @property
+    def neutral(self) -> bool:
+        """Whether it is neutral by :attr:`stability`."""
+        return (self.found or self.solved).neutral
+
     def onto(self, solved: Solved, **more: Any) -> EquilibriumResult:
         """The same equilibrium on another mesh."""
         return replace(self, solved=solved, found=self.found or self.solved, **more)

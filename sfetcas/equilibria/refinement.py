@@ -116,7 +116,7 @@ class Refinement:
         prepared = self.meshes.prepared(mesh)
         loading = prepared.model.loading(source.solved.factor)
         state = self._placed(source.solved, prepared, loading)
-        solved = self._corrected(prepared, state, loading, source.stability.stable == "neutral")
+        solved = self._corrected(prepared, state, loading, source.neutral)
         if source.kept and not solved.converged:
             solved = deflated(prepared, state, loading, ()) or solved
         if source.kept and (not solved.converged or prepared.distance(state, solved.state) > DRIFT):
@@ -249,7 +249,7 @@ class Refinement:
                 self.meshes.target, pilot
             )
             raise SolveError(Status.FAILED, detail, state)
-        if pilot.stability.negative == 0 < now.solved.negative:
+        if now.solved.negative > 0 and pilot.stability.negative == 0:
             detail = f"{few} asked for snap away from what is stable on {many}" + more_than(self.meshes.target, pilot)
             raise SolveError(Status.FAILED, detail, state)
         return now
@@ -381,10 +381,10 @@ def _refuse_free(found: Solved) -> None:
     SceneError
         Names the motion.
     """
-    stability = found.stability
     # What rounding hides may be held or free: a note says so.
-    if stability.stable != "neutral" or stability.hidden or not found.prepared.diagnosis.mobility:
+    if not found.neutral or found.stability.hidden or not found.prepared.diagnosis.mobility:
         return
+    stability = found.stability
     equations, shape = found.equations, np.concatenate([stability.shape, stability.travel])
     inside = (equations.row < equations.unknowns) & (equations.column < equations.unknowns)
     row, column, entries = equations.row[inside], equations.column[inside], found.point.entries[inside]

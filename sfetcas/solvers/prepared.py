@@ -524,6 +524,14 @@ class Solved:
         return self.prepared._tester.test(self.point)
 
     @property
+    def neutral(self) -> bool:
+        """Whether :attr:`stability` calls it neutral, at less cost where no eigenvalue is near zero."""
+        if not self.model.conservative or "stability" in self.__dict__:
+            return self.stability.stable == "neutral"
+        found = self.prepared.inertia(self.point)
+        return found.negative == 0 and found.zero > 0
+
+    @property
     def negative(self) -> int:
         """Number of negative eigenvalues, at less cost; 0 if :attr:`.Prepared.switches_branch` is false."""
         return self.prepared._test.negative(self.point) if self.prepared.switches_branch else 0

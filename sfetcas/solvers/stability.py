@@ -200,8 +200,6 @@ class StabilityTest:
 
     def negative(self, point: Point) -> int:
         """Number of negative eigenvalues alone, at a fraction of the cost of :meth:`test`."""
-        if self._n == 0:
-            return 0
         point = self.equations.symmetric(point)
         clear = self._clearly_negative(point)
         if clear is not None:
@@ -304,8 +302,6 @@ class StabilityTest:
 
     def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
         """Numbers of negative and of zero eigenvalues alone; in large models the latter only if ``doubtful``."""
-        if self._n == 0:
-            return Inertia(0, 0)
         point = self.equations.symmetric(point)
         clear = self._clearly_negative(point)
         if clear is not None:
@@ -455,6 +451,8 @@ class StabilityTest:
 
     def _clearly_negative(self, point: Point) -> int | None:
         """Number of negative eigenvalues where the core tells it and none is near zero; see :meth:`counting`."""
+        if self._n == 0:
+            return 0
         if self.equations.rows and self.equations.redundant:
             return None
         return None if self.counting is None else self.equations.clearly_negative(point.entries, self.counting[0])
