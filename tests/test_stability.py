@@ -50,6 +50,22 @@ def straight(table, load, elements=4, order=6):
     return found.stability, prepared
 
 
+@pytest.mark.parametrize("many", [False, True])
+@pytest.mark.parametrize("share", [0.5, 1.0, 1.5])
+@pytest.mark.parametrize("name", CRITICAL)
+def test_neutral_is_what_the_test_calls_so(name, share, many, monkeypatch):
+    """Also of models whose eigenvalues are counted by factors."""
+    table, critical = CRITICAL[name]
+    if many:
+        monkeypatch.setattr(stability_module, "DENSE", 0)
+        monkeypatch.setattr(stability_module, "MANY_ROWS", -1)
+    prepared = Prepared(model_of(table, 8, 6))
+    loading = prepared.model.loading(share * critical)
+    found = prepared.correct(prepared.equations.start(loading), loading)
+    assert found.neutral is (share == 1.0)
+    assert (found.stability.stable == "neutral") is (share == 1.0)
+
+
 @pytest.mark.parametrize("name", CRITICAL)
 def test_smallest_eigenvalue_changes_sign_at_the_critical_load(name):
     table, critical = CRITICAL[name]
