@@ -583,13 +583,15 @@ class Lines:
         )
         return replace(mesh, cuts=cuts, points=()), kept
 
-    def moved(self, before: Mesh, after: Mesh) -> float:
-        """How far, over the size, ends of elements are from any that there were, at most."""
-        far = (
-            float(np.abs(cuts[:, None] - before.cuts[name]).min(axis=1).max()) * self.scene.center_lines[name].length
-            for name, cuts in after.cuts.items()
-        )
-        return max(far, default=0.0) / self.scene.size
+    def off_ends(self, found: Solved) -> float:
+        """How far, over the size, places that slide on what bends are from ends of elements, at most."""
+        mesh, most = found.model.mesh, 0.0
+        for point in points_of(found):
+            for member, x, free in zip(point.members, point.at, point.slides, strict=True):
+                if free and 0.0 < x < 1.0 and not self.closest.stiff(member):
+                    off = abs(float(mesh.cuts[member][mesh.cut_at(member, x)]) - x)
+                    most = max(most, off * self.closest.lengths[member])
+        return most / self.scene.size
 
     def _with_end(self, cuts: Array, member: str, x: float, keeps: bool) -> Array:
         """Ends of elements of a member with one at a place; as many as before if it ``keeps`` their number."""

@@ -92,8 +92,10 @@ TOUCHED = 4e-5
 SUDDEN = 3.0
 """How many times faster than in the step before what is followed may turn, where it turns by a little at all."""
 
-FITS = 3
-"""Times that elements are made to end where points slide, at most: each time these move by a small share of that."""
+FITS, FITTED = 3, 20.0
+"""Times that elements are made to end where points slide, at most: each time these move by a fiftieth of that
+(measured), so that they need not where they end nearer to these than so many times the accuracy.
+"""
 
 PATIENT = 2.0**-6
 """Step down to which the ends of lines are followed; in shorter ones they are sought anew."""
@@ -1061,9 +1063,10 @@ class MemberContact:
         ``prescribed`` as of :meth:`.Lines.fitted`.
         """
         for _ in range(times):
-            before = found.model.mesh
-            mesh, points = self.lines.fitted(before, points_of(found), prescribed=prescribed)
-            if self.lines.moved(before, mesh) < self.accuracy:
+            if self.lines.off_ends(found) < FITTED * self.accuracy:
+                break
+            mesh, points = self.lines.fitted(found.model.mesh, points_of(found), prescribed=prescribed)
+            if mesh.same(replace(found.model.mesh, points=())):
                 break
             there = self.resolved(mesh, points, found, way)
             if there is None or tangents_turned(found.fields, there.fields) > STRIDE:
