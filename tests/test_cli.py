@@ -11,16 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli
 from moving import FALLING
 
 from sfetcas import Scene, SceneError, cli, outputs
 from sfetcas.cli import main
 from sfetcas.description.records import counted
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 
@@ -348,7 +344,7 @@ def test_extreme_input_is_one_short_sentence(scene, capfd, command, changes, mor
 
 
 def test_half_a_character_is_no_json(scene, capsys):
-    table = tomllib.loads(scene().read_text())
+    table = tomli.loads(scene().read_text())
     for changed in (
         {**table, "title": "\ud800"},
         {**table, "nodes": {**table["nodes"], "\ud800": table["nodes"]["B"]}},
@@ -494,7 +490,7 @@ def test_a_long_run_without_a_terminal_says_now_and_then_how_far_it_is(kind, mon
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(cli, "EVERY", 0.01)
     moving = {"type": "dynamic", "end": 2.0} if kind == "dynamic" else {}
-    scene = Scene.from_dict(tomllib.loads(BEAM.replace("EI3 = 1.0", "EI3 = 1.0\nrhoA = 1.0")) | {"analysis": moving})
+    scene = Scene.from_dict(tomli.loads(BEAM.replace("EI3 = 1.0", "EI3 = 1.0\nrhoA = 1.0")) | {"analysis": moving})
     expected = "sfetcas: run 1: 25 %, 0.5 of 2 s, " if kind == "dynamic" else "sfetcas: static, "
     with cli._progress(scene) as progress:
         if progress is not None:

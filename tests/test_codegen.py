@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import scenes
 import systems
+import tomli
 from scenes import cantilever, helix
 
 from benchmarks import code as benchmark_code
@@ -27,11 +28,6 @@ from sfetcas.parametric.arguments import argument, default_arguments
 from sfetcas.parametric.equilibrium import equilibrium_solver
 from sfetcas.solvers.globalised import Code
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
 PROBLEMS = Path(__file__).parent.parent / "problems"
 
 
@@ -40,7 +36,7 @@ def is_static(file):
 
     By the text, as making scenes of all at each start of tests takes seconds.
     """
-    table = tomllib.loads(file.read_text(encoding="utf-8"))
+    table = tomli.loads(file.read_text(encoding="utf-8"))
     measured = [{"pull", "length"} & set(t) and not t.get("pushes") for t in table.get("tendons", {}).values()]
     static = table.get("analysis", {}).get("type", "static") == "static"
     pushed = any("insertion" in record for kind in ("tubes", "members") for record in table.get(kind, {}).values())

@@ -9,13 +9,9 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import tomli
 
 from sfetcas import Scene, load
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 markdown = pytest.importorskip("markdown_it")
 
@@ -53,7 +49,7 @@ def is_run(block):
 
 def is_scene(block):
     """Whether it is a whole scene; other TOML is read, too."""
-    table = tomllib.loads(block.text) if block.language == "toml" else {}
+    table = tomli.loads(block.text) if block.language == "toml" else {}
     return {"nodes", "members"} <= set(table) and any("position" in node for node in table["nodes"].values())
 
 
@@ -120,7 +116,7 @@ def test_page_runs_as_it_stands(page, monkeypatch, tmp_path):
 def test_scenes_of_a_page_are_scenes(page):
     for block in blocks(page):
         if is_scene(block) and "caption" not in block.options:
-            Scene.from_dict(tomllib.loads(block.text))
+            Scene.from_dict(tomli.loads(block.text))
 
 
 def test_links_of_the_readme_lead_somewhere():

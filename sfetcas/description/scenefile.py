@@ -5,20 +5,16 @@ from __future__ import annotations
 import json
 import os
 import re
-import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
+
+import tomli
 
 from ..errors import SceneError
 from ..files import UnreadableError, read_file
 from .records import say
 from .scene import Scene, check_scene
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 try:
     import tomli_w
@@ -90,7 +86,7 @@ def _values(text: str, format: str) -> Any:
     try:
         if format == "toml":
             _check_keys(text)
-        values = tomllib.loads(text) if format == "toml" else json.loads(text, object_pairs_hook=_table)
+        values = tomli.loads(text) if format == "toml" else json.loads(text, object_pairs_hook=_table)
         if "\\ud" in text.lower():
             # Half of a pair stands for no character, and could neither be printed nor written.
             json.dumps(values, ensure_ascii=False, default=str).encode()
@@ -99,7 +95,7 @@ def _values(text: str, format: str) -> Any:
         raise
     except UnicodeEncodeError as error:
         raise SceneError(f"not read as JSON: found {error.object[error.start]!a}, half of a character") from None
-    except (tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
+    except (tomli.TOMLDecodeError, json.JSONDecodeError) as error:
         raise SceneError(f"not read as {format.upper()}: {error}") from None
     except ValueError:
         # Python reads no longer ones, as that takes long.

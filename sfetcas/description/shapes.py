@@ -321,16 +321,14 @@ def _line(start: Floats, chord: Floats, length: float, curve: Curve) -> CenterLi
 def _bending_axis(curve: Curve) -> int:
     x = curve.samples
     rotations = values_of(curve.quaternions(x))
-    frames = matrix(rotations)
-    bending = rotate(rotations, values_of(curve.curvatures(x)))
-    size = max(1.0, float(np.abs(bending).max()))
-    level = max(
-        np.abs(values_of(curve.positions(x))[:, 2]).max(),
-        # also holds between the samples of a helix that meet it always at the same phase
-        np.abs(bending[:, :2]).max() / size,
-    )
-    if level > tolerances.DECIMAL:
+    if np.abs(values_of(curve.positions(x))[:, 2]).max() > tolerances.DECIMAL:
         return 0
+    if values_of(curve.turning):
+        # This also holds between the samples of a helix that meet it always at the same phase.
+        bending = np.abs(rotate(rotations, values_of(curve.curvatures(x))))
+        if bending[:, :2].max() / max(1.0, float(bending.max())) > tolerances.DECIMAL:
+            return 0
+    frames = matrix(rotations)
     out_of_plane = np.abs(frames[:, 2, 1:]).max(axis=0)
     return 3 if out_of_plane[0] <= tolerances.DECIMAL else 2 if out_of_plane[1] <= tolerances.DECIMAL else 0
 
