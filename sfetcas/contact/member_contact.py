@@ -92,9 +92,10 @@ TOUCHED = 4e-5
 SUDDEN = 3.0
 """How many times faster than in the step before what is followed may turn, where it turns by a little at all."""
 
-FITS, FITTED = 3, 20.0
+FITS, FITTED, HARDLY_OFF = 3, 20.0, 1e-4
 """Times that elements are made to end where points slide, at most: each time these move by a fiftieth of that
-(measured), so that they need not where they end nearer to these than so many times the accuracy.
+(measured), so that they need not where they end nearer to these than so many times the accuracy, and than so far over
+the size, or than the accuracy itself.
 """
 
 PATIENT = 2.0**-6
@@ -1063,7 +1064,7 @@ class MemberContact:
         ``prescribed`` as of :meth:`.Lines.fitted`.
         """
         for _ in range(times):
-            if self.lines.off_ends(found) < FITTED * self.accuracy:
+            if self.lines.off_ends(found) < max(self.accuracy, min(FITTED * self.accuracy, HARDLY_OFF)):
                 break
             mesh, points = self.lines.fitted(found.model.mesh, points_of(found), prescribed=prescribed)
             if mesh.same(replace(found.model.mesh, points=())):
