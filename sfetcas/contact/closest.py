@@ -96,6 +96,7 @@ class Closest:
         self._passing = weakref.WeakKeyDictionary[Fields, dict[PairKey, tuple[Array, Array, Array]]]()
         self._nearby = weakref.WeakKeyDictionary[Model, Nearby]()
         self._curves = weakref.WeakKeyDictionary[Fields, Curve]()
+        self._minima = weakref.WeakKeyDictionary[Fields, dict[Any, list[Near]]]()
         self._courses = weakref.WeakKeyDictionary[Fields, dict[str, tuple[Array, Array, Array]]]()
         self._between = [pair for pair in pairs if pair.stop is None]
         self.members = sorted({member for pair in pairs for member in pair.members})
@@ -120,6 +121,7 @@ class Closest:
         """Draw back the surfaces of all obstacles and members from where they are by a length, m."""
         self.pairs = {key: pair.drawn_back(by) for key, pair in self._given.items()} if by else self._given
         self._nearby.clear()
+        self._minima.clear()
 
     def back(self, point: ContactPoint) -> float:
         """How far the surfaces of a point are drawn back, m, from where the model has them."""
@@ -144,7 +146,14 @@ class Closest:
 
     def found(self, fields: Fields, reach: float, pairs: Sequence[Pair] | None = None) -> list[Near]:
         """All minima, of given pairs or of all, at which surfaces are nearer to each other than ``reach``, m."""
-        pairs = list(self.pairs.values()) if pairs is None else pairs
+        known = self._minima.setdefault(fields, {})
+        key = reach, None if pairs is None else tuple(pair.key for pair in pairs), *self.sides.values()
+        if key not in known:
+            known[key] = self._found(fields, reach, list(self.pairs.values()) if pairs is None else pairs)
+        return list(known[key])
+
+    def _found(self, fields: Fields, reach: float, pairs: Sequence[Pair]) -> list[Near]:
+        """As of :meth:`found`."""
         stopped = [pair for pair in pairs if pair.stop is not None]
         x = {member: self.samples(fields.model.mesh, member) for pair in stopped for member in pair.members}
         near, keys = self._beside_obstacles(fields, x, reach, stopped), {p.key for p in pairs if p.stop is None}
@@ -285,6 +294,8 @@ class Closest:
             )
             least &= gaps < reach + self.lengths[member] * np.diff(places).max()
             i = np.flatnonzero(least)
+            if not len(i):
+                continue
             low, high = places[np.maximum(i - 1, 0)], places[np.minimum(i + 1, len(places) - 1)]
             at = places[i] if ends else self._least(fields, pair, low, places[i], high)
             gaps, normals = self._gaps(fields, pair, at)
