@@ -23,7 +23,7 @@ from ..mechanics.center_lines import Along, Curve, Lines
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import ContactPoint, Mesh
 from ..mechanics.model import Model
-from ..mechanics.segments import standing, stations_of_line
+from ..mechanics.segments import standing, weights_towards
 from ..mechanics.tables import Tables
 from .nearby import ALIKE, ITERATIONS, Nearby, Places
 from .pairs import SAME, Near, Pair, PairKey
@@ -450,14 +450,18 @@ class Closest:
         if pair.stop is None:
             return self.beside(fields, pair, cuts, reach)
         normals = self._gaps(fields, pair, cuts)[1]
-        points = [ContactPoint(*pair.key, (x,), (False,), pair.distance, line=True) for x in cuts.tolist()]
-        at, share = zip(*(stations_of_line(mesh, point) for point in points), strict=True)
-        starts = np.cumsum([0, *map(len, at[:-1])])
-        # Also at an end that is held, whose element is free to leave.
-        gaps = np.add.reduceat(self._gaps(fields, pair, np.concatenate(at))[0] * np.concatenate(share), starts)
+        (points, weights), lengths = mesh.rule, np.diff(cuts)
+        within = self._gaps(fields, pair, (cuts[:-1, None] + lengths[:, None] * points).ravel())[0]
+        rising, falling = (
+            lengths * np.einsum("ek,k->e", within.reshape(-1, len(points)), weights_towards(towards, weights))
+            for towards in (points, 1.0 - points)
+        )
+        # Of an end of elements those before and behind it; also at an end that is held, whose element is free to leave.
+        sides = np.append(0.0, lengths) + np.append(lengths, 0.0)
+        gaps = (np.append(0.0, rising) + np.append(falling, 0.0)) / sides
         return [
-            Near(*pair.key, point.at, normal, gap, pair.distance)
-            for point, normal, gap in zip(points, normals, gaps.tolist(), strict=True)
+            Near(*pair.key, (x,), normal, gap, pair.distance)
+            for x, normal, gap in zip(cuts.tolist(), normals, gaps.tolist(), strict=True)
             if gap < reach
         ]
 
