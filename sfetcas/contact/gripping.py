@@ -60,8 +60,10 @@ class Placed:
             at = np.array([points[i].at[side] for i, side in chosen])
             found = zip(chosen, fields.positions(member, at), fields.tangents(member, at), strict=True)
             for (i, side), *here in found:
-                seen = fields.seen(points[i].contact, *(part[None] for part in here))
-                self.places[i][side], self.tangents[i][side] = (part[0] for part in seen)
+                if fields.motion_of(points[i].contact) is not None:
+                    here = [part[0] for part in fields.seen(points[i].contact, *(part[None] for part in here))]
+                self.places[i][side], self.tangents[i][side] = here
+        self._points, self._normals = points, dict[tuple[str, int], dict[int, Array]]()
         self.vectors = [
             here[0] - (here[1] if len(here) == 2 else scene.obstacles[point.contact].place)
             for here, point in zip(self.places, points, strict=True)
@@ -73,7 +75,13 @@ class Placed:
             # Centre lines that cross, as none do that rest, may as well be on either side of each other.
             across = (self.vectors[i], np.cross([0.0, 0.0, 1.0], self.tangents[i][0]), np.array([1.0, 0.0, 0.0]))
             return unit(next(vector for vector in across if vector.any()))
-        return np.asarray(stop.normals(self.places[i][0][None], self.tangents[i][0][None])[0])
+        contact = self._points[i].contact
+        if (key := (contact, id(stop))) not in self._normals:
+            # Those of all points on the obstacle.
+            own = [k for k, point in enumerate(self._points) if point.contact == contact]
+            places, tangents = (np.array([part[k][0] for k in own]) for part in (self.places, self.tangents))
+            self._normals[key] = dict(zip(own, stop.normals(places, tangents), strict=True))
+        return self._normals[key][i]
 
 
 @dataclass(eq=False)
@@ -140,19 +148,17 @@ class Gripping:
             touched = share * (vector - apart)
         else:
             touched, share = np.array(point.grip.touched), point.grip.share
+        # Along a line they follow for all points of it.
+        frame, before_, now_ = tuple[Vector, ...](), tuple[Vector, ...](), tuple[Vector, ...]()
+        origin: Vector = (0.0, 0.0, 0.0)
+        if not point.line:
+            frame = tuple(_told(three(way)) for way in directions_along(normal[: fields.model.element.axes]))
+            origin = _told(apart + touched)
+            before_, now_ = (tuple(map(_told, placed.tangents[i])) for placed in (before, now))
+        firm = self.firm or (0.0 if point.new else FIRM[0])
+        strength = coefficient * self.strength
         return replace(
-            point,
-            grip=Grip(
-                coefficient * self.strength,
-                self.firm or (0.0 if point.new else FIRM[0]),
-                tuple(_told(three(way)) for way in directions_along(normal[: fields.model.element.axes])),
-                _told(apart + touched),
-                tuple(map(_told, before.tangents[i])),
-                tuple(map(_told, now.tangents[i])),
-                _told(touched),
-                share,
-                yields=self.yields,
-            ),
+            point, grip=Grip(strength, firm, frame, origin, before_, now_, _told(touched), share, yields=self.yields)
         )
 
     def _along_line(
