@@ -378,12 +378,14 @@ class MemberContact:
         by much: what is jammed between obstacles would.
         """
         scales = found.model.scales
-        for point in found.model.mesh.points:
+        rough = [point for point in found.model.mesh.points if point.grip is not None]
+        size = loads_on(self.scene, scales) * scales.force if rough else 0.0
+        for point in rough:
             # What is new sticks, however hard that is.
             if point.grip is not None and point.grip.firm > 0.0:
                 told = found.fields.contact_point(point)
                 push = max(told["push"], 0.0)
-                gives = point.grip.yields * scales.length * push / (loads_on(self.scene, scales) * scales.force)
+                gives = point.grip.yields * scales.length * push / size
                 jams = gives > JAMMED * self.scene.size
                 self.jammed |= jams
                 if jams or told["rubs"] > point.grip.coefficient * push + SLIPPED * scales.force:

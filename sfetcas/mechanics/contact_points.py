@@ -342,14 +342,18 @@ def _distance(scene: Scene, point: ContactPoint) -> Any:
 def contact_points_in(parts: Parts) -> Iterator[One]:
     """Terms of the points where members touch each other or obstacles."""
     segments, unit, axes, space = parts.segments, parts.scales.length, parts.element.axes, parts.element.space
-    vectors, pressed = undeformed_vectors(parts.scene, parts.mesh.points), _of_lines(parts)
-    for point, begin in zip(parts.mesh.points, vectors, strict=True):
+    points, pressed = parts.mesh.points, _of_lines(parts)
+    single = [point for point in points if not point.line]
+    begins = {p.name: begin for p, begin in zip(single, undeformed_vectors(parts.scene, single), strict=True)}
+    size = loads_on(parts.scene, parts.scales) if any(point.grip is not None for point in points) else 0.0
+    axis = np.concatenate([np.eye(axes)[0], np.zeros(axes + 1)])
+    for point in points:
         between = segments.place(point.between)
         if point.line:
-            axis = np.concatenate([np.eye(axes)[0], np.zeros(axes + 1)])
             yield from pressed[point.name]
-            yield _held(parts, point, Gap(space, True), axis, np.zeros(3), [])
+            yield _held(parts, point, Gap(space, True), axis, np.zeros(3), [], size)
             continue
+        begin = begins[point.name]
         slides = [segments.place(point.place(i)) if free else GROUND for i, free in enumerate(point.slides)]
         stands = [standing(parts.mesh, point, side) for side in range(len(point.members))]
         starts = [
@@ -372,7 +376,7 @@ def contact_points_in(parts: Parts) -> Iterator[One]:
             place, row = (between,), f"{point.name}, beside"
             yield One(gap, point.name, "", numbers(np.concatenate([other, data])), (), place, row)
         data = numbers(np.concatenate([*(way[:axes] for way in ways), data]))
-        yield _held(parts, point, gap, data, begin, slides)
+        yield _held(parts, point, gap, data, begin, slides, size)
         if point.tangent:
             yield tangential_at(parts, point, gap, data, carrier)
 
@@ -393,15 +397,16 @@ def _of_lines(parts: Parts) -> dict[str, list[One]]:
     return found
 
 
-def _held(parts: Parts, point: ContactPoint, gap: Gap, data: Array, begin: Array, slides: list[int]) -> One:
-    """The term that holds the gap; with friction the one that finds the forces."""
+def _held(
+    parts: Parts, point: ContactPoint, gap: Gap, data: Array, begin: Array, slides: list[int], size: float
+) -> One:
+    """The term that holds the gap; with friction the one that finds the forces, under loads of a size."""
     segments, unit, axes, grip = parts.segments, parts.scales.length, parts.element.axes, point.grip
     between = segments.place(point.between)
     carrier = carrier_of(parts, point.contact) if gap.carried else Carrier()
     if grip is None:
         place = (between,)
         return One(gap, point.name, carrier.node, numbers(data), carrier.turns, place, f"{point.name}, gap")
-    size = loads_on(parts.scene, parts.scales)
     yields = max(grip.yields / size, LEAST_YIELDING)
     origin = (np.array(grip.origin) - begin)[:axes] / unit
     further = [np.array(one)[:axes] for one in (*grip.before, *grip.now)]
