@@ -97,6 +97,7 @@ class Closest:
         self._nearby = weakref.WeakKeyDictionary[Model, Nearby]()
         self._curves = weakref.WeakKeyDictionary[Fields, Curve]()
         self._minima = weakref.WeakKeyDictionary[Fields, dict[Any, list[Near]]]()
+        self._apart = weakref.WeakKeyDictionary[Fields, dict[tuple[PairKey, float], float]]()
         self._courses = weakref.WeakKeyDictionary[Fields, dict[str, tuple[Array, Array, Array]]]()
         self._between = [pair for pair in pairs if pair.stop is None]
         self.members = sorted({member for pair in pairs for member in pair.members})
@@ -122,6 +123,7 @@ class Closest:
         self.pairs = {key: pair.drawn_back(by) for key, pair in self._given.items()} if by else self._given
         self._nearby.clear()
         self._minima.clear()
+        self._apart.clear()
 
     def back(self, point: ContactPoint) -> float:
         """How far the surfaces of a point are drawn back, m, from where the model has them."""
@@ -396,7 +398,10 @@ class Closest:
 
     def gap_at(self, fields: Fields, pair: PairKey, at: float) -> float:
         """Gap, m, between a place of a member and an obstacle."""
-        return float(self._gaps(fields, self.pairs[pair], np.array([at]))[0][0])
+        known = self._apart.setdefault(fields, {})
+        if (pair, at) not in known:
+            known[pair, at] = float(self._gaps(fields, self.pairs[pair], np.array([at]))[0][0])
+        return known[pair, at]
 
     def bends(self, fields: Fields, pair: PairKey, at: float) -> float:
         """Curvature, 1/m, of the gap between a place of a member and an obstacle by arc length."""

@@ -420,12 +420,10 @@ class Touching(Conditions[_At]):
         for pair in self.closest.pairs.values():
             if pair.stop is None or pair.edge:
                 continue
-            (member,), radius = pair.members, self.scene.contacts[pair.contact].member_radius
+            nodes = self.scene.members[pair.members[0]].nodes
             for end, free in enumerate(pair.ends):
-                if not free and self.scene.members[member].nodes[end] != pair.stop.carrier:
-                    x = np.array([float(end)])
-                    seen = fields.seen(pair.contact, fields.positions(member, x), fields.tangents(member, x))
-                    yield _Driven(*pair.key, (float(end),)), float(pair.stop.gaps(*seen)[0]) - radius
+                if not free and nodes[end] != pair.stop.carrier:
+                    yield _Driven(*pair.key, (float(end),)), self.closest.gap_at(fields, pair.key, float(end))
 
     def _clamped(self, fields: Fields) -> Iterator[tuple[_Flat, float]]:
         """Ends of members that no obstacle can push, and how much the members bend away from where they are on one."""
