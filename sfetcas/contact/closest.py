@@ -98,6 +98,7 @@ class Closest:
         self._curves = weakref.WeakKeyDictionary[Fields, Curve]()
         self._minima = weakref.WeakKeyDictionary[Fields, dict[Any, list[Near]]]()
         self._apart = weakref.WeakKeyDictionary[Fields, dict[tuple[PairKey, float], float]]()
+        self._sloping = weakref.WeakKeyDictionary[Fields, dict[Any, tuple[Array, Array]]]()
         self._courses = weakref.WeakKeyDictionary[Fields, dict[str, tuple[Array, Array, Array]]]()
         self._between = [pair for pair in pairs if pair.stop is None]
         self.members = sorted({member for pair in pairs for member in pair.members})
@@ -380,7 +381,7 @@ class Closest:
 
         ``lifted`` as of :meth:`lies`.
         """
-        slope, _ = self._slopes(fields, self.pairs[pair], np.array([end]))
+        slope, _ = self._slopes_at(fields, pair, (end,))
         level = abs(float(slope[0])) * self.scene.size < max(self.lying, lifted)
         return level and self.lies(fields, pair, min(begin, end), max(begin, end), lifted)
 
@@ -405,7 +406,14 @@ class Closest:
 
     def bends(self, fields: Fields, pair: PairKey, at: float) -> float:
         """Curvature, 1/m, of the gap between a place of a member and an obstacle by arc length."""
-        return float(self._slopes(fields, self.pairs[pair], np.array([at]))[1][0])
+        return float(self._slopes_at(fields, pair, (at,))[1][0])
+
+    def _slopes_at(self, fields: Fields, pair: PairKey, at: tuple[float, ...]) -> tuple[Array, Array]:
+        """As of :meth:`_slopes`, at a place that is asked for several times."""
+        known = self._sloping.setdefault(fields, {})
+        if (pair, at) not in known:
+            known[pair, at] = self._slopes(fields, self.pairs[pair], np.array(at))
+        return known[pair, at]
 
     def _gaps(self, fields: Fields, pair: Pair, x: Array) -> tuple[Array, Array]:
         """Of places (n,) of the member gaps (n,), m, and normals (n, 3); at an edge for the side 1."""
@@ -503,7 +511,7 @@ class Closest:
         """Slopes (2,) or (1,) of the distance by the arc lengths at a place."""
         pair = self.pairs[key]
         if pair.stop is not None:
-            return self._slopes(fields, pair, np.array(at))[0]
+            return self._slopes_at(fields, key, at)[0]
         slope, _, apart = self._half_square(fields, pair.members, at)
         return np.asarray(slope / apart)
 
