@@ -7,7 +7,9 @@ import pytest
 from test_points_on_obstacles import FLOOR, LARGER, cantilever, smaller
 
 from sfetcas import solve
+from sfetcas.mathematics import complementarity
 from sfetcas.mathematics.complementarity import by_pivots
+from sfetcas.mathematics.core import core, without_core
 from sfetcas.solvers.arclength import Curve, Tangent, bordered
 from sfetcas.solvers.between_states import turned_between
 from sfetcas.solvers.newton import correct
@@ -175,3 +177,27 @@ def test_with_an_unknown_factor_the_solution_is_across_a_direction():
     assert across == pytest.approx(0.0, abs=1e-12)
     assert abs(found.loading.factor - factor) > 1e-7
     assert found.residual < 1e-9
+
+
+@pytest.mark.parametrize("along", [False, True])
+def test_single_pivots_of_the_core_are_those_without_it(along):
+    """Also where several rows are as good, as of whole numbers, and where none leads on."""
+    if core() is None:
+        pytest.skip("there is no core")
+    rng, ended = np.random.default_rng(7), set[bool]()
+    for i in range(200):
+        n = int(rng.integers(1, 25))
+        vectors = rng.standard_normal((n, int(rng.integers(1, n + 2))))
+        matrix, given = vectors @ vectors.T, rng.standard_normal(n)
+        matrix = matrix + 0.5 * (i % 3 == 0) * (vectors[:, :1] - vectors[:, :1].T)
+        if i % 4 == 0:
+            rows = rng.integers(-2, 3, size=(n, 3)).astype(float)
+            matrix, given = rows @ rows.T, rows @ rng.integers(-2, 3, size=3).astype(float)
+        back = np.abs(rng.standard_normal(n)) - given if along else None
+        found = complementarity._by_single_pivots(matrix, given, back)
+        with without_core():
+            other = complementarity._by_single_pivots(matrix, given, back)
+        ended.add(found is None)
+        assert (found is None) == (other is None)
+        assert found is None or (found == other).all()
+    assert ended == {False, True}

@@ -8,6 +8,7 @@
 #include "follow.c"
 #include "afar.c"
 #include "motion.c"
+#include "pivots.c"
 
 int sf_version(void) { return SF_VERSION; }
 

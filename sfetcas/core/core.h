@@ -11,7 +11,7 @@
 #ifndef SFETCAS_CORE_H
 #define SFETCAS_CORE_H
 
-#define SF_VERSION 6
+#define SF_VERSION 7
 
 #ifdef _WIN32
 #define SF_PUBLIC __declspec(dllexport)
@@ -180,6 +180,11 @@ SF_PUBLIC int sf_factorise(sf_factors *factors, const double *entries, int *nega
 SF_PUBLIC int sf_backward(const sf_factors *factors, int columns, double *x, double *work);
 SF_PUBLIC int sf_solve(sf_system *system, const double *entries, int columns, const double *b, double *x,
                        double *work);
+
+/* ---- linear complementarity ------------------------------------------------------------------------ */
+
+SF_PUBLIC int sf_lemke(int n, double *table, int *basis, int out, int pivots, double flat, double rounding,
+                       double size);
 
 /* ---- Newton's method ------------------------------------------------------------------------------- */
 

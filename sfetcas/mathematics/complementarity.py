@@ -34,6 +34,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .arrays import TINY, Array, Index, Sparse
+from .core import core, doubles, integers
 
 __all__ = ["Friction", "by_pivots", "complementary"]
 
@@ -223,7 +224,13 @@ def _by_single_pivots(matrix: Array, b: Array, back: Array | None = None, pivots
     low = np.flatnonzero(b < 0.0)
     if not len(low):
         return np.zeros(n, bool)
-    basis, out, enters = np.arange(n), int(low[np.argmax(-table[low, -1] / back[low])]), 2 * n
+    basis, out, enters = integers(np.arange(n)), int(low[np.argmax(-table[low, -1] / back[low])]), 2 * n
+    library = core()
+    if library is not None:
+        table = doubles(table)
+        addresses = table.ctypes.data, basis.ctypes.data
+        lost = library.sf_lemke(n, *addresses, out, pivots * n, FLAT, ROUNDING, float(size))
+        return None if lost else np.isin(np.arange(n), basis[basis >= n] - n)
     for _ in range(pivots * n):
         table[out] /= table[out, enters]
         taken = table[:, enters].copy()

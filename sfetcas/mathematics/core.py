@@ -347,7 +347,7 @@ SIZES = (
 )
 """What the core says of the sizes of what is handed to it, if it is the one that this module was written for."""
 
-VERSION = 6
+VERSION = 7
 """Number of the interface, as ``SF_VERSION``."""
 
 
@@ -452,6 +452,7 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL | None:
     library.sf_find.argtypes = [*[_pointer] * 5, _int, *[_pointer] * 4]
     library.sf_advance_size.argtypes = [_pointer] * 2
     library.sf_advance.argtypes = [_pointer] * 6
+    library.sf_lemke.argtypes = [_int, _pointer, _pointer, _int, _int, *[_double] * 3]
     library.sf_pivots.argtypes = [_pointer] * 2
     library.sf_take_step_size.argtypes = [_pointer] * 3
     library.sf_take_step.argtypes = [*[_pointer] * 4, _double, *[_pointer] * 6]
