@@ -92,11 +92,8 @@ TOUCHED = 4e-5
 SUDDEN = 3.0
 """How many times faster than in the step before what is followed may turn, where it turns by a little at all."""
 
-FITS, FITTED, HARDLY_OFF = 3, 20.0, 1e-4
-"""Times that elements are made to end where points slide, at most: each time these move by a fiftieth of that
-(measured), so that they need not where they end nearer to these than so many times the accuracy, and than so far over
-the size, or than the accuracy itself.
-"""
+FITS = 3
+"""Times that elements are made to end where points slide, at most: each time these move by a small share of that."""
 
 PATIENT = 2.0**-6
 """Step down to which the ends of lines are followed; in shorter ones they are sought anew."""
@@ -1066,7 +1063,7 @@ class MemberContact:
         ``prescribed`` as of :meth:`.Lines.fitted`.
         """
         for _ in range(times):
-            if self.lines.off_ends(found) < max(self.accuracy, min(FITTED * self.accuracy, HARDLY_OFF)):
+            if self.lines.off_ends(found) < self.accuracy:
                 break
             mesh, points = self.lines.fitted(found.model.mesh, points_of(found), prescribed=prescribed)
             if mesh.same(replace(found.model.mesh, points=())):
