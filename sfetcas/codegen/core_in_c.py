@@ -19,8 +19,10 @@ from ..mathematics.arrays import Array, Index
 from ..mathematics.core import TapeTable
 from ..mathematics.linear import factor_tables, last_rows, pivot_order
 from ..mathematics.source import in_lines, table
-from ..mathematics.tapes import NAMES
+from ..mathematics.tapes import NAMES, tape_of
 from ..mechanics.evaluation import Handed, handed
+from ..mechanics.model import Model
+from ..mechanics.terms import rotation_gradient
 from ..parametric.equilibrium import EquilibriumSolver
 from .rendering import optimised
 
@@ -249,7 +251,7 @@ class SolverTables(_Tables):
         equations, model = method.equations, solver.model
         known = handed(equations.layout, model, equations.noise)
         if known is None or not known.layout.searchable:
-            raise SceneError("found a kind of member that the core in C does not know, accepted: to solve in Python")
+            raise SceneError(_unknown(model))
         rules, given, arrays = method.for_core()
         points = known.arrays | {array.ctypes.data: array for array in arrays}
         structure, convex, varying = known.structure, known.layout.convex, inputs.varying
@@ -356,3 +358,14 @@ def _find_size(known: Handed, convex: tuple[TapeTable, list[Array]] | None, inpu
     found = 2 * (states + 2 * structure.total + structure.entry_count) + 3 * structure.entry_count
     of_convex = 0 if convex is None else 8 * (convex[0].results + convex[0].slots)
     return found + 6 * structure.total + of_convex + inputs + 2 * states
+
+
+def _unknown(model: Model) -> str:
+    """A sentence on what generated equilibria do not contain."""
+    lacking = (group for group in model.terms if tape_of(rotation_gradient(group.kind)) is None)
+    named = ((group.kind.table, name.removeprefix(f"{group.kind.table}.")) for group in lacking for name in group.names)
+    names = dict.fromkeys(f"{table_}.{name}" for table_, name in named if name)
+    what = f"{', '.join(names)} in a field from a table" if names else "a kind of member"
+    return (
+        f"found {what}, which generated equilibria do not know, accepted: to solve in Python, or to export time steps"
+    )
