@@ -124,9 +124,7 @@ def test_exported_steps(tmp_path):
 
 @needs_compiler
 def test_exported_equilibria_without_tables_say_so_by_the_name_of_the_magnet(tmp_path):
-    sentence = (
-        r"found magnets\.\w+ in a field from a table, which generated equilibria do not know, accepted: to solve in"
-    )
+    sentence = r"found magnets\.\w+ with a function that generated equilibria do not know, as that of a table, accepted"
     with pytest.raises(sfetcas.SceneError, match=sentence):
         sfetcas.export(strip(given(), accuracy=1e-3, steps=[0.05]), tmp_path, name="c", arguments=["factor"])
 

@@ -364,8 +364,7 @@ def _unknown(model: Model) -> str:
     """A sentence on what generated equilibria do not contain."""
     lacking = (group for group in model.terms if tape_of(rotation_gradient(group.kind)) is None)
     named = ((group.kind.table, name.removeprefix(f"{group.kind.table}.")) for group in lacking for name in group.names)
-    names = dict.fromkeys(f"{table_}.{name}" for table_, name in named if name)
-    what = f"{', '.join(names)} in a field from a table" if names else "a kind of member"
-    return (
-        f"found {what}, which generated equilibria do not know, accepted: to solve in Python, or to export time steps"
-    )
+    records = dict.fromkeys(f"{kind}.{name}" for kind, name in named if name)
+    what = ", ".join(records) or "a kind of member"
+    accepted = "accepted: to solve in Python, or to export time steps"
+    return f"found {what} with a function that generated equilibria do not know, as that of a table, {accepted}"

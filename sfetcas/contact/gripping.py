@@ -149,16 +149,16 @@ class Gripping:
         else:
             touched, share = np.array(point.grip.touched), point.grip.share
         # Along a line they follow for all points of it.
-        frame, before_, now_ = tuple[Vector, ...](), tuple[Vector, ...](), tuple[Vector, ...]()
+        frame, earlier, here = tuple[Vector, ...](), tuple[Vector, ...](), tuple[Vector, ...]()
         origin: Vector = (0.0, 0.0, 0.0)
         if not point.line:
             frame = tuple(_told(three(way)) for way in directions_along(normal[: fields.model.element.axes]))
             origin = _told(apart + touched)
-            before_, now_ = (tuple(map(_told, placed.tangents[i])) for placed in (before, now))
+            earlier, here = (tuple(map(_told, placed.tangents[i])) for placed in (before, now))
         firm = self.firm or (0.0 if point.new else FIRM[0])
         strength = coefficient * self.strength
         return replace(
-            point, grip=Grip(strength, firm, frame, origin, before_, now_, _told(touched), share, yields=self.yields)
+            point, grip=Grip(strength, firm, frame, origin, earlier, here, _told(touched), share, yields=self.yields)
         )
 
     def _along_line(

@@ -375,18 +375,16 @@ class MemberContact:
         by much: what is jammed between obstacles would.
         """
         scales = found.model.scales
-        rough = [point for point in found.model.mesh.points if point.grip is not None]
+        # What is new sticks, however hard that is.
+        rough = [(p, grip) for p in found.model.mesh.points if (grip := p.grip) is not None and grip.firm > 0.0]
         size = loads_on(self.scene, scales) * scales.force if rough else 0.0
-        for point in rough:
-            # What is new sticks, however hard that is.
-            if point.grip is not None and point.grip.firm > 0.0:
-                told = found.fields.contact_point(point)
-                push = max(told["push"], 0.0)
-                gives = point.grip.yields * scales.length * push / size
-                jams = gives > JAMMED * self.scene.size
-                self.jammed |= jams
-                if jams or told["rubs"] > point.grip.coefficient * push + SLIPPED * scales.force:
-                    return False
+        for point, grip in rough:
+            told = found.fields.contact_point(point)
+            push = max(told["push"], 0.0)
+            jams = grip.yields * scales.length * push / size > JAMMED * self.scene.size
+            self.jammed |= jams
+            if jams or told["rubs"] > grip.coefficient * push + SLIPPED * scales.force:
+                return False
         return self.within is None or self.within(found)
 
     def _pressing(

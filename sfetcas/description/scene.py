@@ -305,9 +305,10 @@ class Scene(Record):
             for load in self.loads.values():
                 if load.member is not None:
                     found.setdefault(load.member, []).append(load)
-            kept = self.loads, {name: tuple(own) for name, own in found.items()}
+            kept = self.loads, MappingProxyType({name: tuple(own) for name, own in found.items()})
             self.__dict__["_loads_along"] = kept
-        return MappingProxyType(kept[1])
+        along: Mapping[str, tuple[Load, ...]] = kept[1]
+        return along
 
     @property
     def started(self) -> bool:

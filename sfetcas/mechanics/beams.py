@@ -133,8 +133,9 @@ def _heaviest(scene: Scene) -> float:
 def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beams:
     """Data of the elements of all members; small members have no elements."""
     members = {name: member for name, member in scene.members.items() if member.type != "small"}
-    lengths = {name: scene.center_lines[name].length / scales.length * np.diff(mesh.cuts[name]) for name in members}
-    along = {name: (c := mesh.cuts[name])[:-1, None] + np.diff(c)[:, None] * element.points for name in members}
+    cuts = {name: mesh.cuts[name] for name in members}
+    lengths = {name: scene.center_lines[name].length / scales.length * np.diff(own) for name, own in cuts.items()}
+    along = {name: own[:-1, None] + np.diff(own)[:, None] * element.points for name, own in cuts.items()}
     counts, n = [len(own) for own in lengths.values()], element.order + 1
     first = dict(zip(members, np.cumsum([0, *counts])[:-1].tolist(), strict=True))
     length = np.concatenate([np.zeros(0), *lengths.values()])

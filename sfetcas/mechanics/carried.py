@@ -29,9 +29,6 @@ __all__ = ["Carried", "carried", "magnetic", "natural_turning"]
 ALLOWANCE = 4.0
 """A member of loops is taken to carry so many times the largest share of them, though no more than all loads."""
 
-FEW = 50
-"""Nodes up to which their levels follow from a full matrix."""
-
 GROUND = 0
 """Number of the ground; nodes come after it."""
 
@@ -249,10 +246,6 @@ def _levels(a: Index, b: Index, sources: Array) -> Array:
     row, column = np.concatenate([a, b, a, b]), np.concatenate([a, b, b, a])
     value = np.repeat([1.0, 1.0, -1.0, -1.0], len(a))
     inside = (row < count) & (column < count)
-    if count <= FEW:
-        matrix = np.zeros((count, count))
-        np.add.at(matrix, (row[inside], column[inside]), value[inside])
-        return np.linalg.solve(matrix, sources)
     places, inverse = np.unique(column[inside] * count + row[inside], return_inverse=True)
     solver = SparseSolver(count, places % count, places // count)
     solver.factor(np.bincount(inverse.ravel(), weights=value[inside]))

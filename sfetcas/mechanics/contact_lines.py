@@ -322,9 +322,9 @@ def pressed_along(
     member, rough, carrier = points[0].members[0], points[0].grip is not None, carrier_of(parts, points[0].contact)
     cuts, first = mesh.cuts[member], parts.beams.first[member]
     each = [(point, *one) for point in points for one in beside_line(mesh, point)]
-    number, begins = first + (own := np.array([e for _, e, *_ in each])), cuts[own]
+    own, n = np.array([cut for _, cut, *_ in each]), len(each)
+    number, begins = first + own, cuts[own]
     x = begins[:, None] + element.points * (cuts[own + 1] - begins)[:, None]
-    n = len(each)
     places = parts.scene.center_lines[member].positions(x.ravel()) - origin
     along = [np.array(point.grip.along)[:, :axes] for point in points if point.grip is not None]
     every = np.ones((n, 1))

@@ -21,7 +21,7 @@ from ..description.tendons import Stretch
 from ..errors import SolveError, Status
 from ..mathematics import curves, quaternion
 from ..mathematics.arrays import Array, Index, first_of_largest, values_of
-from ..mathematics.interpolation import differentiation, evaluation, integration
+from ..mathematics.interpolation import differentiation, evaluation
 from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
 from .balance import three as _three
@@ -713,11 +713,8 @@ class Fields:
 
     def moved_within(self, elements: Index, xi: Array) -> Array:
         """Displacements (n, axes), dimensionless, at places xi (n,) of elements (n,), in them from 0 to 1."""
-        values, inverse = np.unique(xi, return_inverse=True)
-        element, starts = self.model.element, self._reached[0]
-        weights = (integration(element.points, values) / element.weights)[inverse]
-        gained = (self.turned - self.model.beams.tangent)[elements]
-        return np.asarray(starts[elements] + np.einsum("nk,nka->na", weights, gained))
+        at = Stations.within(self.model.element, elements, xi)
+        return _summed(at, self._reached[0], self.turned - self.model.beams.tangent)
 
     @functools.cached_property
     def _reached(self) -> tuple[Array, Array]:

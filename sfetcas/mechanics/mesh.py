@@ -14,7 +14,7 @@ from .. import tolerances
 from ..description.formulas import Formula
 from ..description.records import brief, counted
 from ..description.scene import Scene, check_scene
-from ..description.sections import FINE, CrossSection
+from ..description.sections import FINE
 from ..description.sections import breaks as kinks
 from ..description.showing import first_lines, shown
 from ..description.tendons import kinks_along
@@ -503,7 +503,8 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
     rotations = [np.linalg.norm(m.rotation) for m in scene.motions.values() if m.rotation is not None]
     reaching, follows = carried(scene), any(load.follows for load in scene.loads.values())
     cuts, middle = {}, np.linspace(0.0, 1.0, 5)
-    soft = {name: float(np.nanmin(one.stiffness(middle))) for name, one in _bent_by(scene).items()}
+    bent = {str(member.section) for member in scene.members.values() if member.type == "flexible"}
+    soft = {name: float(np.nanmin(scene.sections[name].stiffness(middle))) for name in bent}
     for name in cut(scene):
         line, section = scene.center_lines[name], scene.sections.get(str(scene.members[name].section))
         if scene.members[name].type == "rigid" or section is None:
@@ -523,12 +524,6 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
         beside = np.array([np.abs(cuts[name] - x).min() for x in edges])
         cuts[name] = np.unique([*cuts[name], *np.array(edges)[beside > NEXT]])
     return Mesh(order, cuts, rigid=rigid(scene))
-
-
-def _bent_by(scene: Scene) -> dict[str, CrossSection]:
-    """The sections of flexible members, by name."""
-    used = {str(member.section) for member in scene.members.values() if member.type == "flexible"}
-    return {name: scene.sections[name] for name in sorted(used)}
 
 
 NEXT = 1e-3

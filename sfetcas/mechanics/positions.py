@@ -79,6 +79,8 @@ ROOM, LARGEST, EACH = 128_000, 2_000, 200
 what each counts for beside them.
 """
 
+_KNOWN: Recent[tuple[Positions, Assembly]] = Recent(ROOM, EACH + LARGEST)
+
 Source = tuple[str, int]
 """What a displacement depends on: the chord (E), unknowns (Y) or prescribed displacement (B) of a number."""
 
@@ -293,7 +295,7 @@ def place_nodes(
     """
     guides = {name: _guide(scene, name) for name in scene.nodes if _slides(scene, name)}
     held = frozenset(name for name, node in scene.nodes.items() if node.support != "free")
-    structure = _Structure(segments, axes, dict(bodies), guides, held, mesh.order, assembly)
+    structure = _Structure(segments, axes, bodies, guides, held, mesh.order, assembly)
     return _KNOWN.found(structure.key, structure.placed, lambda _: structure.size)
 
 
@@ -366,6 +368,3 @@ def _entries(placing: _Placing, order: int) -> int:
     touched = ({number for kind, number in gap.terms if kind == "E"} for _, gap in placing.rows)
     count = sum(parts[i].elements.stop - parts[i].elements.start for row in touched for i in row)
     return count * order + 4 * len(placing.labels)
-
-
-_KNOWN: Recent[tuple[Positions, Assembly]] = Recent(ROOM, EACH + LARGEST)

@@ -341,7 +341,7 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     for contact in scene.contacts.values() if mesh.spots is not None else ():
         stopped |= set(members_of(contact, scene.members))
     # Of each point and side the ends of elements whose places it needs.
-    pointed = [(p, m, cuts_of_point(mesh, p, side)) for p in mesh.points for side, m in enumerate(p.members)]
+    pointed = [(m, cuts_of_point(mesh, p, side)) for p in mesh.points for side, m in enumerate(p.members)]
     parts: list[Segment] = []
     begin = 0
     for name, member in scene.members.items():
@@ -357,7 +357,7 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
         last = len(cuts) - 1
         every = name in stopped or (mesh.places and member.type == "flexible")
         inner = range(1, last) if every else _retained_cuts(scene, mesh, name)
-        own = {cut for _, m, needed in pointed if m == name for cut in needed}
+        own = {cut for m, needed in pointed if m == name for cut in needed}
         stops = [0, *sorted({*inner, *own} - {0, last}), last]
         here = ends[name, 0]
         for a, b in zip(stops, stops[1:], strict=False):
@@ -377,7 +377,7 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     # Turning axes act upon all that has mass.
     retained |= set(scene.nodes) if scene.rotating is not None else set()
     retained |= {ends[ring.member, 0] for ring in scene.rings.values()} | carriers(scene.contacts)
-    touched = {(touching, cut) for _, touching, needed in pointed for cut in needed or [0]}
+    touched = {(touching, cut) for touching, needed in pointed for cut in needed or [0]}
     retained |= {place_of_cut(mesh, ends, *one) for one in touched}
     retained |= set(_sprung(scene, mesh)) | {load.node for load in scene.loads.values() if load.follows and load.node}
     sizes = [part.elements.stop - part.elements.start for part in parts]

@@ -41,6 +41,13 @@ class Stations:
         self.elements: Index = np.clip(np.searchsorted(cuts, x, side="right") - 1, 0, len(cuts) - 2)
         self.xi: Array = (x - cuts[self.elements]) / (cuts[self.elements + 1] - cuts[self.elements])
 
+    @classmethod
+    def within(cls, element: Element, elements: Index, xi: Array) -> Stations:
+        """Stations at places xi (n,), 0 to 1, in elements (n,) of any members."""
+        found = cls.__new__(cls)
+        found._element, found.elements, found.xi = element, elements, xi
+        return found
+
     def _rows(self, rows: Callable[[Array], Array]) -> Array:
         """Rows of a matrix for stations that, where they are many, often repeat."""
         if len(self.xi) < FEW:

@@ -149,8 +149,8 @@ class Term(Components, abc.ABC):
 
     @property
     def largest_at(self) -> int | None:
-        """The end of its element, 0 or 1, towards which forces rise that it spreads along it, and which at the points
-        are its :meth:`answer`: those across what it touches, then those along; None where it spreads none.
+        """Of a force that it spreads along its element the end, 0 or 1, at which that is largest; None where it spreads
+        none.  Its :meth:`answer` then is the force on each point of the element, across what it touches, then along.
         """
         return None
 

@@ -122,20 +122,25 @@ def _smallest(
     entries = equations.of_rows(point.entries)
     largest = float(np.bincount(equations.row, weights=entries**2, minlength=equations.total)[n:].max())
     equations.solver.factor(equations.regularised(entries, np.ones(n), TINY_SHARE * largest))
-    count = 1
-    while True:
+
+    def iterated(count: int, times: int) -> tuple[Array, Array]:
         block = np.random.default_rng(0).standard_normal((equations.total, min(count, equations.rows)))
-        for _ in range(INVERSE if count > 1 else FIRST):
+        for _ in range(times):
             block[:n] = 0.0
             block[n:] = np.linalg.qr(block[n:])[0]
             block = equations.solver.solve(block)
         left, sizes, _ = np.linalg.svd(block[n:], full_matrices=False)
-        squares = 1.0 / sizes - TINY_SHARE * largest
-        if count == 1 and squares[0] > apart * max(largest, usual):
-            return squares[:0], left[:, :0], largest
-        if count > 1 and (squares.max() > SLACK * largest or count >= equations.rows):
+        return 1.0 / sizes - TINY_SHARE * largest, left
+
+    squares, left = iterated(1, FIRST)
+    if squares[0] > apart * max(largest, usual):
+        return squares[:0], left[:, :0], largest
+    count = BLOCK
+    while True:
+        squares, left = iterated(count, INVERSE)
+        if squares.max() > SLACK * largest or count >= equations.rows:
             return squares[::-1], left[:, ::-1], largest
-        count = 4 * count if count > 1 else BLOCK
+        count *= 4
 
 
 ROUGHLY = 1e-4
@@ -145,8 +150,8 @@ MANY = 300
 """Number of rows above which only the smallest singular values are computed."""
 
 INVERSE, FIRST, BLOCK = 3, 2, 8
-"""Inverse iterations, and those of a single vector; few suffice as the squares of loose rows are smaller by twelve
-digits; vectors at first.
+"""Inverse iterations of several vectors, those of a single one, and how many the several are at first; few iterations
+suffice as the squares of loose rows are smaller by twelve digits.
 """
 
 APART = 1e4

@@ -98,7 +98,8 @@ class Sides:
     def _chains(self) -> list[tuple[list[str], Index, Array]]:
         """Members with chains of the same number of nodes: names, rotations and fractions of the length (names, n)."""
         model, found = self._equations.model, dict[int, list[tuple[str, Index, Array]]]()
-        for name, ends in model.rotations.ends.items():
+        # Sums at their nodes are then the same in whatever order a file has them.
+        for name, ends in sorted(model.rotations.ends.items()):
             if name in model.beams.first:
                 one = name, model.chain(name), model.along(name)
             else:
