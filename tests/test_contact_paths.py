@@ -132,7 +132,7 @@ def test_path_meets_the_equilibria_of_repeated_solves(name, span, steps, accurac
 def test_points_of_the_path_are_equilibria(heavy):
     path = heavy[0]
     for point in path.points[::7]:
-        load = path.fields(point).total_load[1]
+        load = path.fields(point).outer_force[1]
         clamp = path.fields(point).reaction("clamp")[0][1]
         floor = look_up_force(path, point)
         # Forces of up to 30, in balance to rounding of Newton's method.

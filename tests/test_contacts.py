@@ -272,6 +272,56 @@ def test_forces_balance_push_and_leave_no_place_inside(name):
     assert step.certificate.stable is True
 
 
+def resting(*, more):
+    """A frame that its load and weight press onto a floor, with a small member between two of its nodes."""
+    length = {"ab": math.hypot(0.7, 0.1), "dc": math.hypot(0.7, 0.4), "bd": 0.6}
+    length["bc"] = math.hypot(0.7, 0.2) * 0.2 / math.sin(0.2)
+    table = {
+        "gravity": [0, -9.81],
+        "sections": {"s": {"EI3": 0.6, "rhoA": 0.11}},
+        "nodes": {
+            "A": {"position": [0, 1], "support": "clamped"},
+            "B": {"position": [0.7, 1.1]},
+            "C": {"position": [1.4, 0.9]},
+            "D": {"position": [0.7, 0.5], "mass": 0.2},
+        },
+        "members": {
+            "ab": {"nodes": ["A", "B"], "section": "s"},
+            "bc": {"nodes": ["B", "C"], "section": "s", "shape": {"type": "arc", "angle": 0.4, "normal": [0, 0, 1]}},
+            "dc": {"nodes": ["D", "C"], "section": "s"},
+            "bd": {"nodes": ["B", "D"], "section": "s", "type": "small"},
+        },
+        "contacts": {"floor": {"type": "plane", "point": [0, 0.15], "normal": [0, 1], "members": ["ab", "bc", "dc"]}},
+        "loads": {"C": {"type": "force", "node": "C", "value": [0, -1.3]}},
+        **more,
+    }
+    return made(table), 1.3 + 9.81 * (0.2 + 0.11 * sum(length.values()))
+
+
+OUTSIDE = {
+    "weight": {},
+    "spring": {"springs": {"k": {"type": "translational", "node": "B", "stiffness": 0.4, "direction": [0.6, 0.8]}}},
+    "tendon": {
+        "tendons": {"t": {"way": [{"ground": [0.2, 1.4]}, {"node": "B"}, {"node": "C"}], "tension": 0.4}},
+    },
+}
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_whatever_acts_from_outside_is_in_the_balance(name):
+    scene, weight = resting(more=OUTSIDE[name])
+    step = solve(scene).last
+    pulls = np.array([0.0, -weight, 0.0])
+    if name == "spring":
+        pulls += step.spring("k").effort * np.array([0.6, 0.8, 0.0])
+    elif name == "tendon":
+        way = np.array([0.2, 1.4, 0.0]) - step.position("B")
+        pulls += 0.4 * way / np.linalg.norm(way)
+    assert abs(pulls[0]) > 0.01 or name == "weight"
+    # Newton's method leaves less than 1e-11 of forces of order 1.
+    np.testing.assert_allclose(balance(step), -pulls, atol=1e-9)
+
+
 @every
 def test_contact_does_not_depend_on_the_axes(name):
     if name == "upset":

@@ -615,6 +615,18 @@ class Equations:
         shares[0][:, :width] -= acting.torque.reshape(len(acting.torque), width)
         return shares
 
+    def outer_force(self, state: State, loading: Loading) -> Array:
+        """Resultant (axes,) of what acts on the system from outside but for supports and obstacles, dimensionless:
+        loads, weights, and the pulls of springs, tendons and fields.
+        """
+        on_places, moments = self.acting(state, loading).force.copy(), np.zeros((len(self.model.rotations.kind), 3))
+        for terms, share in zip(self._terms, self.shares(state, loading), strict=True):
+            # Forces between members add up to zero, those of obstacles are left out.
+            if terms.kind.table != "contacts":
+                terms.add_forces(-share, moments, on_places)
+        on_places[self.model.segments.without_position] = 0.0
+        return np.asarray(on_places.sum(axis=0))
+
     @functools.cached_property
     def reactions(self) -> Reactions:
         """Linear maps from the forces of the terms to the reactions of the ground."""

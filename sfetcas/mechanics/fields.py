@@ -670,9 +670,11 @@ class Fields:
         return self._nodal[:, 0]
 
     @property
-    def total_load(self) -> Array:
-        """Resultant of all forces that are loads, (3,) N."""
-        return _three(self._loading.force.sum(axis=0)) * self.model.scales.force
+    def outer_force(self) -> Array:
+        """Resultant of what acts from outside but for supports and obstacles, (3,) N: loads, weights, and the pulls of
+        springs, tendons and fields.
+        """
+        return _three(self._equations.outer_force(self.state, self._applied)) * self.model.scales.force
 
     def stiffness(self, member: str, x: float) -> float:
         """Smallest bending stiffness of a member's section at a fraction of its length, dimensionless."""
