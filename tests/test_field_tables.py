@@ -97,7 +97,6 @@ def test_analyses():
 
 
 @needs_compiler
-@pytest.mark.xfail(raises=sfetcas.SceneError, strict=True, reason="the core looks up no tables, see the test below")
 def test_exported_code(tmp_path):
     """The program in C agrees with the process of the same functions, and with statics."""
     scene, arguments = strip(given(high=0.2), accuracy=1e-3, steps=[0.05]), ["factor"]
@@ -120,13 +119,6 @@ def test_exported_steps(tmp_path):
     moving = strip(given(), accuracy=1e-3, type="dynamic", end=1.0, step=0.01)
     sfetcas.export(moving, tmp_path / "motion", name="motion")
     assert "10 of 10 steps agree, 10 of them to the last bit" in said(built(tmp_path / "motion", "motion"))
-
-
-@needs_compiler
-def test_exported_equilibria_without_tables_say_so_by_the_name_of_the_magnet(tmp_path):
-    sentence = r"found magnets\.\w+ with a function that generated equilibria do not know, as that of a table, accepted"
-    with pytest.raises(sfetcas.SceneError, match=sentence):
-        sfetcas.export(strip(given(), accuracy=1e-3, steps=[0.05]), tmp_path, name="c", arguments=["factor"])
 
 
 LEAVING = given(high=0.2)

@@ -155,7 +155,7 @@ class InC:
         """The name of a tape."""
         name = f"sf_tape_{len(self.tables)}"
         stretch, code, constant = (self._arrays[address] for address in (tape.stretch, tape.code, tape.constant))
-        if ctypes.addressof(tape) in self._compiled and len(code) <= LONGEST:
+        if ctypes.addressof(tape) in self._compiled and len(code) <= LONGEST and not tape.spline:
             self.tables.append(optimised("O1", compiled(f"{name}_compiled", stretch, code, constant, tape.slots)))
             own = {"stretches": "0", "slots": "0", "stretch": "0", "code": "0", "constant": "0"}
             inner = self.value(tape, **own, compiled=f"{name}_compiled")
@@ -367,4 +367,4 @@ def _unknown(model: Model) -> str:
     records = dict.fromkeys(f"{kind}.{name}" for kind, name in named if name)
     what = ", ".join(records) or "a kind of member"
     accepted = "accepted: to solve in Python, or to export time steps"
-    return f"found {what} with a function that generated equilibria do not know, as that of a table, {accepted}"
+    return f"found {what} with an operation that generated equilibria do not have, as erfinv, {accepted}"

@@ -11,7 +11,7 @@
 #ifndef SFETCAS_CORE_H
 #define SFETCAS_CORE_H
 
-#define SF_VERSION 7
+#define SF_VERSION 8
 
 #ifdef _WIN32
 #define SF_PUBLIC __declspec(dllexport)
@@ -40,6 +40,7 @@ typedef struct {
   const sf_stretch *stretch;
   const sf_operation *code;
   const double *constant;
+  const int *spline; /* what is looked up in which spline, and their shapes, see sf_look_up */
   void (*compiled)(const double *arguments, double *results);
 } sf_tape;
 

@@ -48,6 +48,13 @@ SF_WIDE static void NAME(const sf_tape *tape, const double *in, double *out, int
           EACH r[l] = x;
         }
         break;
+      case SF_SPLINE:
+        for (; code < end; ++code) {
+          double *r = w + (size_t)code->to * LANES;
+          int l;
+          EACH r[l] = sf_look_up(tape, tape->spline + code->b, w + (size_t)code->a * LANES + l, LANES);
+        }
+        break;
       UNARY(SF_ASSIGN, x[l])
       BINARY(SF_ADD, x[l] + y[l])
       BINARY(SF_SUB, x[l] - y[l])

@@ -16,7 +16,7 @@ enum {
   SF_SIN, SF_COS, SF_TAN, SF_ASIN, SF_ACOS, SF_ATAN, SF_ATAN2, SF_EXP, SF_LOG, SF_EXPM1, SF_LOG1P, SF_POW,
   SF_SINH, SF_COSH, SF_TANH, SF_ASINH, SF_ACOSH, SF_ATANH, SF_ERF, SF_HYPOT, SF_FABS, SF_SIGN, SF_COPYSIGN, SF_FMIN,
   SF_FMAX, SF_FMOD, SF_REMAINDER, SF_FLOOR, SF_CEIL, SF_LT, SF_LE, SF_EQ, SF_NE, SF_NOT, SF_AND, SF_OR, SF_IF,
-  SF_OPERATIONS
+  SF_SPLINE, SF_OPERATIONS
 };
 
 /* What is no single instruction, or seldom done. */
@@ -60,6 +60,66 @@ static double sf_other(int operation, double x, double y) {
     case SF_IF: return x != 0.0 ? y : 0.0;
     default: return NAN;
   }
+}
+
+/* The cubic splines of n coefficients that are not zero at x, differentiated order times; returns the number of the first.
+ *
+ * Beyond the knots they go on as they are in the last interval.
+ */
+static int sf_basis(int n, const double *knot, double x, int order, double *value) {
+  int low = 3, high = n, degree, i, j;
+  const double *t;
+  while (high - low > 1) {
+    int middle = (low + high) / 2;
+    if (x < knot[middle])
+      high = middle;
+    else
+      low = middle;
+  }
+  t = knot + low;
+  for (i = 1; i < 4; ++i) value[i] = 0.0;
+  value[0] = order > 3 ? 0.0 : 1.0;
+  for (degree = 1; degree < 4; ++degree) {
+    double last = 0.0;
+    /* Splines of one degree less, from the first to the last, each take from two of these (Cox, de Boor). */
+    for (j = 0; j < degree; ++j) {
+      const double left = t[j + 1 - degree], right = t[j + 1], share = value[j] / (right - left);
+      if (degree > 3 - order) {
+        value[j] = degree * (last - share);
+        last = share;
+      } else {
+        value[j] = last + (right - x) * share;
+        last = (x - left) * share;
+      }
+    }
+    value[degree] = degree > 3 - order ? degree * last : last;
+  }
+  return low - 3;
+}
+
+/* A component of a derivative of a spline at a place, whose coordinates stand apart by a stride.
+ *
+ * what: where in tape->spline the spline is, component, orders along each axis.  The spline: axes, components,
+ * coefficients along each axis, and where its knots begin among the constants; its coefficients follow them.
+ */
+static double sf_look_up(const sf_tape *tape, const int *what, const double *place, int stride) {
+  const int *shape = tape->spline + what[0], axes = shape[0], components = shape[1];
+  const double *number = tape->constant + shape[2 + axes];
+  double value[3][4] = {{1.0}, {1.0}, {1.0}}, sum = 0.0;
+  int first[3] = {0, 0, 0}, many[3] = {1, 1, 1}, size[3] = {1, 1, 1}, i, j, k;
+  for (i = 0; i < axes; ++i) {
+    size[i] = shape[2 + i];
+    first[i] = sf_basis(size[i], number, place[(size_t)i * stride], what[2 + i], value[i]);
+    number += size[i] + 4;
+    many[i] = 4;
+  }
+  for (k = 0; k < many[2]; ++k)
+    for (j = 0; j < many[1]; ++j)
+      for (i = 0; i < many[0]; ++i) {
+        const size_t at = ((size_t)(first[2] + k) * size[1] + first[1] + j) * size[0] + first[0] + i;
+        sum += value[2][k] * value[1][j] * value[0][i] * number[at * components + what[1]];
+      }
+  return sum;
 }
 
 #define NAME sf_one

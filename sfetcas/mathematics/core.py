@@ -64,6 +64,7 @@ class TapeTable(ctypes.Structure):
         ("stretch", _pointer),
         ("code", _pointer),
         ("constant", _pointer),
+        ("spline", _pointer),
         ("compiled", _pointer),
     )
 
@@ -347,7 +348,7 @@ SIZES = (
 )
 """What the core says of the sizes of what is handed to it, if it is the one that this module was written for."""
 
-VERSION = 7
+VERSION = 8
 """Number of the interface, as ``SF_VERSION``."""
 
 
@@ -367,17 +368,19 @@ def table_of(tape: Tape) -> tuple[TapeTable, list[Array]]:
 
     Where there is a core operations of a kind stand together, which it does faster.
     """
-    library, code, constant = core(), integers(tape.code), doubles(tape.constant)
+    library, code, constant, splines = core(), integers(tape.code), doubles(tape.constant), integers(tape.splines)
     stretch, arranged, slots = _stretches(code), integers(code[:, 1:]), tape.slots
-    if library is not None:
+    # Where splines are looked up coordinates stand in slots beside each other.
+    if library is not None and not len(splines):
         memory, needed = np.empty(9 * len(code) + slots + 1, np.intc), _int()
         most, arranged = np.empty((len(code), 2), np.intc), np.empty_like(arranged)
         places = (array.ctypes.data for array in (code, most, arranged, memory))
         count = library.sf_arrange(len(code), *places, ctypes.addressof(needed))
         stretch, slots = most[:count].copy(), needed.value
     sizes = (len(stretch), slots, tape.arguments, tape.results, len(constant))
-    arrays = [stretch, arranged, constant]
-    return TapeTable(*sizes, *(array.ctypes.data for array in arrays), None), arrays
+    arrays = [stretch, arranged, constant, splines]
+    addresses = [array.ctypes.data for array in arrays]
+    return TapeTable(*sizes, *addresses[:3], addresses[3] if len(splines) else None, None), arrays
 
 
 def _stretches(code: Array) -> Array:
