@@ -1,8 +1,10 @@
 """Compiled kernels against the virtual machine, and a cache that nothing can spoil."""
 
 import os
+import pickle
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import casadi as ca
@@ -235,3 +237,33 @@ def test_batch_is_the_function_n_times(n):
         for k in range(n):
             for found, one in zip(results, function(*[values[k].T for values in given]), strict=True):
                 np.testing.assert_allclose(found[k], one.full().ravel(order="F"), rtol=1e-14, atol=1e-14)
+
+
+def solving():
+    a, b = ca.MX.sym("a", 4), ca.MX.sym("b", 2)
+    return ca.Function("solving", [a, b], [ca.solve(ca.reshape(a, 2, 2), b, "qr", {"eps": 1e-300})])
+
+
+def test_direct_calls_are_those_of_casadi():
+    """Also of results with zeros that CasADi does not store, and of what it cannot compute."""
+    direct, numbers = kernels.Direct(solving()), np.array([2.0, 0.0, 1.0, 3.0])
+    for call in (direct, pickle.loads(pickle.dumps(direct))):
+        np.testing.assert_array_equal(call(numbers, np.ones(2)), solving()(numbers, np.ones(2)).full().ravel())
+        assert np.isnan(call(0.0 * numbers, np.ones(2))).all()
+        np.testing.assert_array_equal(call(numbers, np.ones(2)), solving()(numbers, np.ones(2)).full().ravel())
+    x = ca.MX.sym("x", 0)
+    sparse = ca.Function("sparse", [x], [ca.MX(ca.DM(ca.Sparsity.triplet(3, 1, [1], [0]), [4.0]))])
+    np.testing.assert_array_equal(kernels.Direct(sparse)(np.zeros(0)), [0.0, 4.0, 0.0])
+
+
+def test_direct_calls_in_threads_have_memory_of_their_own():
+    """Slow functions: two threads that shared memory would take each other's numbers."""
+    x = ca.MX.sym("x", 200)
+    y = x
+    for _ in range(200):
+        y = ca.sin(y) + x
+    direct, given = kernels.Direct(ca.Function("slow", [x], [y])), np.random.default_rng(0).normal(size=(64, 200))
+    expected = [direct(one) for one in given]
+    with ThreadPoolExecutor(4) as pool:
+        for one, other in zip(pool.map(direct, given), expected, strict=True):
+            np.testing.assert_array_equal(one, other)

@@ -27,6 +27,7 @@ from ..dynamics.taken import Memory
 from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..mathematics.arrays import Array
+from ..mathematics.kernels import Direct
 from ..mechanics.equations import Equations
 from ..mechanics.masses import masses_of
 from ..mechanics.model import Model, assemble
@@ -213,7 +214,11 @@ class TimeStep:
     def outputs(self, state: Array, arguments: Array | None = None) -> Array:
         """The results (results,) at a state, in their SI units."""
         p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
-        return np.array(self.output(state, p)).ravel()
+        return self._output(state, p)
+
+    @functools.cached_property
+    def _output(self) -> Direct:
+        return Direct(self.output)
 
 
 def time_step(

@@ -51,8 +51,10 @@ SF_WIDE static void NAME(const sf_tape *tape, const double *in, double *out, int
       case SF_SPLINE:
         for (; code < end; ++code) {
           double *r = w + (size_t)code->to * LANES;
+          const double *place = w + (size_t)code->a * LANES;
           int l;
-          EACH r[l] = sf_look_up(tape, tape->spline + code->b, w + (size_t)code->a * LANES + l, LANES);
+          for (l = 0; l < left; ++l) r[l] = sf_look_up(tape, tape->spline + code->b, place + l, LANES);
+          for (; l < LANES; ++l) r[l] = r[left - 1];
         }
         break;
       UNARY(SF_ASSIGN, x[l])
@@ -75,7 +77,8 @@ SF_WIDE static void NAME(const sf_tape *tape, const double *in, double *out, int
           int l;
           EACH x[l] = a[l];
           EACH y[l] = b[l];
-          EACH r[l] = sf_other(operation, x[l], y[l]);
+          for (l = 0; l < left; ++l) r[l] = sf_other(operation, x[l], y[l]);
+          for (; l < LANES; ++l) r[l] = r[left - 1];
         }
       }
     }

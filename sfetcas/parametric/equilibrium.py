@@ -20,6 +20,7 @@ from ..equilibria.statics import solve
 from ..equilibria.stops import solve_stopped
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
+from ..mathematics.kernels import Direct
 from ..mechanics.accuracy import every_other
 from ..mechanics.contact_points import undeformed_vectors
 from ..mechanics.equations import State
@@ -110,8 +111,8 @@ class EquilibriumSolver:
         """The row of inputs at the start, and its state, where equilibria are not followed from zero."""
         if self.begun is None or self.start is None:
             return None
-        given = self.prepare(np.append(self.begun, self.arguments.places))
-        return np.array(self.arguments.program.row(given)).ravel(), self.start
+        given = self._called(self.prepare, np.append(self.begun, self.arguments.places))
+        return self._called(self.arguments.program.row, given), self.start
 
     @functools.cached_property
     def prepare(self) -> ca.Function:
@@ -196,18 +197,26 @@ class EquilibriumSolver:
         nothing = np.full(self.results.size, np.nan)
         if outcome.code not in SOLVED:
             return outcome, nothing
-        p = np.append(p, outcome.places)
-        given = np.array(self.prepare(p)).ravel()
-        try:
-            outputs = np.array(self.output(p, outcome.state, given)).ravel()
-        except RuntimeError:
-            # A stiffness of what is singular.
-            outputs = nothing
+        p, state = np.append(p, outcome.places), outcome.state
+        given = self._called(self.prepare, p)
+        # A stiffness of what is singular is not a number either.
+        outputs = self._called(self.output, p, state, given)
         if not np.isfinite(outputs).all():
             return replace(outcome, code=Code.NOT_FINITE, negative=NOT_DEFINED), nothing
-        if self.margins is not None and not np.array(self.margins(p, outcome.state, given)).min(initial=0.0) >= 0.0:
+        if self.margins is not None and not self._called(self.margins, p, state, given).min(initial=0.0) >= 0.0:
             return replace(outcome, code=Code.TOUCHES, negative=NOT_DEFINED), nothing
-        return replace(outcome, error=float(self.error(outcome.state, given))), outputs
+        return replace(outcome, error=float(self._called(self.error, state, given)[0])), outputs
+
+    def _called(self, function: ca.Function, *arguments: Array) -> Array:
+        """The result of one of this solver's functions, flat; nan where it cannot be computed."""
+        known = self._calls.get(function.name())
+        if known is None:
+            known = self._calls[function.name()] = Direct(function)
+        return known(*arguments)
+
+    @functools.cached_property
+    def _calls(self) -> dict[str, Direct]:
+        return {}
 
     def found(self, arguments: Array, start: Array | None = None, places: Array | None = None) -> Outcome:
         """The equilibrium for arguments (numbers,), on elements that end where lines do.
@@ -222,14 +231,14 @@ class EquilibriumSolver:
         warm, good = start is not None, known.accepted(arguments)
         for _ in range(FITS):
             p = np.append(arguments, ends)
-            given = np.array(self.prepare(p)).ravel()
-            row = np.array(known.program.row(given)).ravel()
+            given = self._called(self.prepare, p)
+            row = self._called(known.program.row, given)
             outcome = self.method(row if good else row * np.nan, state, warm=warm)
             iterations += outcome.iterations
             outcome = replace(outcome, iterations=iterations, places=ends)
             if outcome.code not in SOLVED or not len(ends):
                 return outcome
-            there = np.array(self.places(p, outcome.state, given)).ravel()
+            there = self._called(self.places, p, outcome.state, given)
             if np.abs(there - ends).max() <= FITTED:
                 return outcome
             if not known.within(there):

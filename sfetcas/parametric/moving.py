@@ -15,6 +15,7 @@ from ..dynamics.stages import StageEquations
 from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..mathematics.arrays import Array
+from ..mathematics.kernels import Direct
 from ..mechanics.expressions import Given
 from ..mechanics.inputs import Inputs
 from ..mechanics.masses import Masses, masses_of
@@ -50,9 +51,13 @@ class ParametricStages(StageEquations):
         row = program.row(self._arguments.given(p))
         return ca.Function(f"{program.prefix}inputs", [p], [row], ["arguments"], ["row"])
 
+    @functools.cached_property
+    def _row(self) -> Direct:
+        return Direct(self.row)
+
     def rows(self, factors: Array) -> Array:
         """Rows of :attr:`inputs` (stages, numbers) for values (stages, numbers) of the arguments."""
-        return np.stack([np.array(self.row(one)).ravel() for one in factors])
+        return np.stack([self._row(one) for one in factors])
 
 
 def motion_of(scene: Scene, settings: Settings, *, one_sided: bool = False) -> Simulation:
