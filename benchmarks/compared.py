@@ -58,7 +58,7 @@ SHOWN = (
 HEADS = (
     "problem",
     "error",
-    "whole run, ms",
+    "whole run: IPOPT / Newton, ms",
     "solved again: cold / warm, ms",
     "exported C: cold / warm, ms",
     "others: cold / warm, ms",
@@ -79,6 +79,7 @@ is the integration alone, without an estimate of its error.
 
 KINDS = {
     "whole run": "whole run: mesh, branch, certificate, error bar",
+    "whole run, Newton": "whole run by Newton's method",
     "cold": "solve alone, cold",
     "warm": "solve alone, warm",
     "C, cold": "exported C, cold",
@@ -181,7 +182,7 @@ def small_table(results: Mapping[str, Any]) -> str:
             (
                 f"{problem}: {results['problems'][problem]}",
                 f"{target:.0e}",
-                pair(problem, target, OWN, "whole run"),
+                pair(problem, target, OWN, "whole run", "whole run, Newton"),
                 pair(problem, target, OWN, "cold", "warm"),
                 pair(problem, target, OWN, "C, cold", "C, warm"),
                 other,

@@ -1,8 +1,8 @@
 """This package on the problems of the comparison; part of ``python -m benchmarks compared``.
 
-Whole runs ask for the wanted error as ``accuracy`` and choose everything themselves.  Repeated solves are those of a
-prepared model on prescribed meshes, by IPOPT or by the globalised Newton method, with interpreted and with compiled
-kernels.  Exported C is compiled with ``-O2``; its motion is that of radau-3 with constant steps.
+Whole runs ask for the wanted error as ``accuracy`` and choose everything themselves, by IPOPT or by the globalised
+Newton method.  Repeated solves are those of a prepared model on prescribed meshes by either of them, and of the solver
+that is exported, in process.  Exported C is compiled with ``-O2``; its motion is that of radau-3 with constant steps.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
@@ -21,14 +22,13 @@ from sfetcas.description.scene import Analysis, Scene
 from sfetcas.dynamics.simulation import simulate
 from sfetcas.equilibria.settings import Settings
 from sfetcas.equilibria.single import solve_model
-from sfetcas.equilibria.solution import Equilibrium
 from sfetcas.equilibria.statics import solve
 from sfetcas.errors import SolveError
 from sfetcas.mathematics.arrays import Array
 from sfetcas.mechanics.elements import ELEMENTS
 from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.model import assemble
-from sfetcas.parametric.equilibrium import EquilibriumSolver
+from sfetcas.parametric.equilibrium import EquilibriumSolver, equilibrium_solver
 from sfetcas.solvers.prepared import Prepared
 
 from .code import CLOCK, compiled_program, has_compiler, timed
@@ -39,6 +39,9 @@ from .timing import times
 __all__ = ["rows"]
 
 PROGRAM = "sfetcas"
+
+WHOLE: dict[str, Literal["ipopt", "newton"]] = {"whole run": "ipopt", "whole run, Newton": "newton"}
+"""Whole runs by what solves the minimisation."""
 
 MESHES = {"SFET3": (2, 4, 8, 16), "SFET5": (1, 2, 3, 4, 6, 8, 12), "SFET7": (1, 2, 3, 4, 6), "SFET9": (1, 2, 3, 4)}
 """Elements and their numbers in each member."""
@@ -70,9 +73,10 @@ def _static_rows(problem: Problem) -> list[Row]:
     exact = problem.exact()
     rows = []
     for target in problem.targets:
-        seconds, solution = times(partial(solve, problem.scene, accuracy=target), RUNS, LONGEST)
-        error = problem.error(solution.last.position(problem.node), exact)
-        rows.append(_row(problem, "whole run", target, f"accuracy = {target:.0e}", error, seconds))
+        for kind, solver in WHOLE.items():
+            seconds, solution = times(partial(solve, problem.scene, accuracy=target, solver=solver), RUNS, LONGEST)
+            error = problem.error(solution.last.position(problem.node), exact)
+            rows.append(_row(problem, kind, target, f"accuracy = {target:.0e}", error, seconds))
     found: dict[str, list[Candidate]] = {"cold": [], "warm": []}
     meshes = []
     for element, counts in MESHES.items():
@@ -92,33 +96,39 @@ class _Mesh:
     def __init__(self, problem: Problem, element: str, count: int, exact: Array) -> None:
         self.problem, self.element, self.count, self.exact = problem, element, count, exact
         self.name = f"{count} {element}" + (" each" if len(problem.scene.members) > 1 else "")
+        self.scene, self.place = _meshed(problem.scene, element, count), f"nodes.{problem.node}.position"
         self.model = assemble(problem.scene, uniform_mesh(problem.scene, ELEMENTS.index(element) + 1, count))
         self.error = np.inf
 
     def repeated(self) -> Iterator[tuple[str, Candidate]]:
-        """Cold solves by each solver with each kind of kernels, and warm ones."""
-        for kernels in ("interpreted", "compiled") if has_compiler() else ("interpreted",):
-            prepared = Prepared(self.model, kernels=kernels)
-            try:
-                near = solve_model(prepared, NEAR)
-                for solver in ("ipopt", "newton"):
-                    words = f"{self.name}, {kernels}, {'IPOPT' if solver == 'ipopt' else 'Newton'}"
-                    yield "cold", self._candidate(words, partial(solve_model, prepared, solver=solver))
-                yield "warm", self._candidate(f"{self.name}, {kernels}", partial(solve_model, prepared, start=near))
-            except SolveError:
-                # A mesh too coarse for the load.
-                continue
+        """Cold and warm solves of a prepared model by each solver, and by the one that is exported."""
+        prepared = Prepared(self.model)
+        try:
+            near = solve_model(prepared, NEAR)
+            for solver in WHOLE.values():
+                words = f"{self.name}, prepared model, {'IPOPT' if solver == 'ipopt' else 'Newton'}"
+                yield "cold", self._candidate(words, self._positions(prepared, solver=solver))
+            yield "warm", self._candidate(f"{self.name}, prepared model", self._positions(prepared, start=near))
+            own = equilibrium_solver(self.scene, "beam", arguments=["factor"], results=[self.place])
+            near_by, _ = own.solve(np.array([NEAR]))
+            words = f"{self.name}, parametric solver"
+            yield "cold", self._candidate(words, lambda: own.solve()[1])
+            yield "warm", self._candidate(words, lambda: own.solve(start=near_by.state)[1])
+        except SolveError:
+            # A mesh too coarse for the load.
+            return
 
-    def _candidate(self, setting: str, call: Callable[[], Equilibrium]) -> Candidate:
-        seconds, step = times(call, 2)
-        self.error = self.problem.error(step.position(self.problem.node), self.exact)
+    def _positions(self, prepared: Prepared, **how: Any) -> Callable[[], Array]:
+        return lambda: solve_model(prepared, **how).position(self.problem.node)
+
+    def _candidate(self, setting: str, call: Callable[[], Array]) -> Candidate:
+        seconds, position = times(call, 2)
+        self.error = self.problem.error(position, self.exact)
         return Candidate(setting, self.error, min(seconds), call)
 
     def exported(self, folder: Path) -> tuple[float, Array]:
         """Error, and seconds (2, rounds) cold and warm, of an exported solver with the load factor as its argument."""
-        scene = _meshed(self.problem.scene, self.element, self.count)
-        place = f"nodes.{self.problem.node}.position"
-        solver = export(scene, folder, name="beam", arguments=["factor"], results=[place])
+        solver = export(self.scene, folder, name="beam", arguments=["factor"], results=[self.place])
         assert isinstance(solver, EquilibriumSolver)
         _, seconds = timed(folder, argument=0, share=NEAR)
         return self.problem.error(solver.solve()[1], self.exact), seconds

@@ -142,7 +142,7 @@ class Implicit:
     @functools.cached_property
     def _outputs(self) -> ca.MX:
         """The answers after a step, then the places where lines end."""
-        found = self._results.expression(self._program, self._rest, short=True)
+        found = self._results.expression(self._program, self._rest)
         places = self._results.touches(self._program, self._rest, self._arguments.ends)
         return self._at(ca.vertcat(found, places))
 

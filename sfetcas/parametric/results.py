@@ -31,7 +31,6 @@ from ..mechanics.reactions import Reactions
 from ..mechanics.rings import up_to
 from ..mechanics.segments import standing
 from ..mechanics.singles import fibre_strain, spin_of, turned_vector
-from ..mechanics.stationarity import Stationarity
 from ..mechanics.stations import Stations
 from ..mechanics.tendon_chains import part_of
 from ..mechanics.tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
@@ -380,15 +379,15 @@ class Results:
 
     def touches(self, program: Program, rest: ca.MX, points: Sequence[ContactPoint]) -> ca.MX:
         """Where points on obstacles are, fractions (points,) of the lengths of their members."""
-        outputs = Outputs(self, program, rest, None, program.stationarity)
+        outputs = Outputs(self, program, rest, None)
         return ca.densify(ca.vertcat(ca.MX(0, 1), *(outputs.place(point, 0) for point in points)))
 
-    def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None, *, short: bool = False) -> ca.MX:
+    def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None) -> ca.MX:
         """All results (size,), one after the other, each row by row, in SI units.
 
-        ``speeds`` (axes, places) are velocities of a motion; ``short`` gives expressions with short derivatives.
+        ``speeds`` (axes, places) are velocities of a motion.
         """
-        outputs = Outputs(self, program, rest, speeds, program.forces if short else program.stationarity)
+        outputs = Outputs(self, program, rest, speeds)
         found = ca.vertcat(*(ca.densify(ca.vec(outputs.value(result.asked).T)) for result in self.results))
         # Where a magnet is beyond the table of a field there are no answers.
         beyond = outputs.beyond()
@@ -408,12 +407,9 @@ class Outputs:
         As of :meth:`Results.rest`.
     speeds : MX (axes, places) or None
         Velocities of a motion.
-    found : Stationarity
     """
 
-    def __init__(
-        self, results: Results, program: Program, rest: ca.MX, speeds: ca.MX | None, found: Stationarity
-    ) -> None:
+    def __init__(self, results: Results, program: Program, rest: ca.MX, speeds: ca.MX | None) -> None:
         self._speeds = speeds
         self._results, self._program = results, program
         self._model, self._expressions = program.model, program.expressions
@@ -421,7 +417,7 @@ class Outputs:
         self._q, self._y, self._lam, self._unwrapped = program.parts
         places = expressions.displacements(self._q, self._y, program.given)
         self._places = ca.reshape(places, expressions.axes, expressions.places)
-        self._found = found
+        self._found = program.forces
         count = len(model.nodes)
         along = [len(x) for x in results.every.values()]
         curved = [results.width(name) * len(results.every[name]) for name in results.curved]

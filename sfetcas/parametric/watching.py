@@ -210,7 +210,7 @@ def _contact_margins(name: str, base: Model, arguments: Sequence[Argument]) -> c
     results = Results(base, names, dict.fromkeys(flexible, tuple(x.tolist())))
     known = Arguments(scene, base, arguments, results, needed=False)
     program, p = known.program, ca.MX.sym("arguments", known.size)
-    outputs = Outputs(results, program, known.undeformed(p), None, program.stationarity)
+    outputs = Outputs(results, program, known.undeformed(p), None)
     positions = {member: outputs.value(answer_name(f"members.{member}.position")) for member in flexible}
     pushes = [outputs.push(point) / base.scales.force for point in points]
     found = [ca.if_else(push > NO_PUSH, push, -FAR) for push in pushes]
