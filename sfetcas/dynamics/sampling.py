@@ -8,6 +8,7 @@ are interpolated instead.
 
 from __future__ import annotations
 
+import functools
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,6 +20,7 @@ from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, unit
 from ..mathematics.interpolation import differentiation, evaluation
+from ..mathematics.keeping import kept
 from ..mechanics.rubbing import Rubs
 from ..mechanics.unilateral import NONE, UnilateralRows
 from .taken import Memory, Taken
@@ -150,6 +152,8 @@ class StepRecord:
         # Each piece is smooth; the steps of one piece are numbered from 1.
         self._pieces: list[list[Taken]] = []
         self._number, self._every, self._bytes = 0, 1, 0
+        # The end of the last step, and what is kept of it: most steps begin there.
+        self._last: tuple[Memory, Memory] | tuple[None, None] = None, None
         # Of the step that was asked for last: many times lie in each.
         self._kept: _Polynomial | None = None
 
@@ -164,7 +168,11 @@ class StepRecord:
             # The last step is kept only until there is a later one.
             self._bytes -= _bytes(piece.pop())
         self._number += 1
-        piece.append(replace(taken, begin=_alone(taken.begin), after=_alone(taken.after), lam=NOTHING))
+        before, known = self._last
+        begin = known if known is not None and before is taken.begin else _alone(taken.begin)
+        after = _alone(taken.after)
+        self._last = taken.after, after
+        piece.append(replace(taken, begin=begin, after=after, lam=NOTHING))
         self._bytes += _bytes(taken)
         if self._bytes > ROOM:
             self._every *= 2
@@ -266,13 +274,12 @@ class _Polynomial:
 
     def sample(self, t: float) -> Sample:
         """The state at a time."""
-        own, begin, h, here = self.own, self.own.begin, self.own.h, self._place(t)
-        row = evaluation(self.at, here)
+        own, begin, h, row = self.own, self.own.begin, self.own.h, self._row(t)
         turn = np.einsum("n,nra->ra", row[0], self.turns)
-        q, slope = turned_by(begin.q, turn), np.einsum("n,nra->ra", (row @ differentiation(self.at))[0], self.turns) / h
+        q, slope = turned_by(begin.q, turn), np.einsum("n,nra->ra", (row @ self._slopes)[0], self.turns) / h
         spin = slope if slope.shape[1] == 1 else quaternion.angular_velocity(turn, slope)
-        v, a = _rates(self.at, here, self.x)
-        lost = begin.lost + _rubbed(own, float(here[0]))
+        v, a = _rates(row, self._slopes, self.x)
+        lost = begin.lost + _rubbed(own, float(self._place(t)[0]))
         given = own.after.unwrapped, begin.remembered, begin.acting, lost, begin.rubs, begin.unilateral
         position = self.middle + (row @ self.x)[0]
         return Sample(t, q, (row @ self.y)[0], position, v / h, a / h**2, spin, *given)
@@ -284,11 +291,22 @@ class _Polynomial:
         here = self._place(t)
         # Without the node that is furthest.
         near = np.delete(np.arange(len(self.at)), int(np.abs(self.at - here).argmax()))
-        change = _rates(self.at, here, self.x)[1] - _rates(self.at[near], here, self.x[near])[1]
+        at, x = self.at[near], self.x[near]
+        other = _rates(evaluation(at, here), differentiation(at), x)[1]
+        change = _rates(self._row(t), self._slopes, self.x)[1] - other
         return float(np.abs(change).max(initial=0.0)) / self.own.h**2
 
     def _place(self, t: float) -> Array:
         return np.array([(t - self.own.begin.t) / self.own.h])
+
+    # What is judged at a time is often sampled there.
+    @kept(1)
+    def _row(self, t: float) -> Array:
+        return evaluation(self.at, self._place(t))
+
+    @functools.cached_property
+    def _slopes(self) -> Array:
+        return differentiation(self.at)
 
 
 def _begun(sample: Sample, first: Taken) -> Sample:
@@ -307,10 +325,10 @@ def _rubbed(taken: Taken, share: float) -> float:
     return float(row[1:] @ taken.rubbed)
 
 
-def _rates(at: Array, here: Array, values: Array) -> tuple[Array, Array]:
-    """First and second derivative of the polynomial through values."""
-    slopes = evaluation(at, here) @ differentiation(at)
-    return (slopes @ values)[0], (slopes @ differentiation(at) @ values)[0]
+def _rates(row: Array, derivative: Array, values: Array) -> tuple[Array, Array]:
+    """First and second derivative of the polynomial through values, by the rows that evaluate it and differentiate."""
+    slopes = row @ derivative
+    return (slopes @ values)[0], (slopes @ derivative @ values)[0]
 
 
 def between(samples: Sequence[Sample], t: float) -> Sample:

@@ -79,8 +79,11 @@ def evaluation(nodes: Array, x: ArrayLike) -> Array:
     difference = x[:, None] - nodes[None, :]
     # Nearer than that the quotient would overflow.
     hit = np.abs(difference) < 1e-200
-    quotient = _barycentric(nodes) / np.where(hit, 1.0, difference)
-    quotient = np.where(hit.any(axis=1, keepdims=True), hit.astype(float), quotient)
+    if hit.any():
+        quotient = _barycentric(nodes) / np.where(hit, 1.0, difference)
+        quotient = np.where(hit.any(axis=1, keepdims=True), hit.astype(float), quotient)
+    else:
+        quotient = _barycentric(nodes) / difference
     return numbers(quotient / quotient.sum(axis=1, keepdims=True))
 
 
