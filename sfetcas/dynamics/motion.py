@@ -25,6 +25,7 @@ from ..mathematics.threads import single_threaded
 from ..mechanics.balance import three
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
+from ..mechanics.loading import Loading
 from ..mechanics.memory import Remembering
 from ..mechanics.mesh import Approach, Spot
 from ..mechanics.model import Model, assemble
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
     from .inertia import Inertia
     from .sampling import Sample, StepRecord
 
-__all__ = ["MotionState", "Mover", "StopEvent", "Trajectory", "apart_in"]
+__all__ = ["Forces", "MotionState", "Mover", "StopEvent", "Trajectory", "apart_in"]
 
 
 class Mover:
@@ -71,7 +72,7 @@ class Mover:
         return StopEvent(event.t * self.time, where, side, event.acts, impulse, lost, *told)
 
     def instant(self, sample: Sample) -> MotionState:
-        """The state by name of a dimensionless sample; multipliers balance all forces in least squares."""
+        """The state by name of a dimensionless sample."""
         model, equations, system = self.model, self.equations, self.inertia.system
         if self.memory.size:
             model = self.memory.model_with(sample.remembered)
@@ -83,50 +84,12 @@ class Mover:
             system.loading_of(model, sample.t) if len(sample.unilateral) else system.loading(self.factors(sample.t))
         )
         free = system.state_of(model, State(sample.q, sample.y, np.zeros(0), sample.unwrapped))
-        point = equations.at(free, loading)
-        forces = self.inertia.forces(sample.v, sample.a)
-        balanced = self.inertia.loading(equations, free, equations.effective(free, loading), forces)
-        friction = np.zeros((0, 0))
-        if system.rubbing is not None and sample.rubs is not None:
-            friction = rubbed(system.rubbing, equations, free, balanced, sample)
-            arms = system.rubbing.arms(sample.y, balanced.shift)
-            balanced = pushed_along(system.rubbing, balanced, friction, arms)
-        if sample.dragged.size:
-            balanced = dragged(equations, balanced, sample.dragged)
-        state = self._balanced(equations, free, balanced)
-        fields = Fields(equations, state, balanced)
-        kinetic = self.inertia.kinetic(sample.v)
-        return MotionState(
-            factor=sample.t * self.time,
-            model=model,
-            state=state,
-            loading=balanced,
-            fields=fields,
-            time=sample.t * self.time,
-            sample=sample,
-            energies=(kinetic, point.strain, point.potential - point.strain - fields.spent / model.scales.moment),
-            mover=self,
-            friction=self._friction(friction, sample),
-        )
-
-    def _friction(self, forces: Array, sample: Sample) -> dict[str | Approach, tuple[Array, bool]]:
-        """Of places that stick or slide, by the names of their rows, forces (3,) along obstacles, N, and which do."""
-        rubbing, rubs = self.inertia.system.rubbing, sample.rubs
-        unit = self.model.scales.force
-        if sample.rubbed:
-            # Members may touch at several places whose rows have one name.
-            return {
-                key.name if isinstance(key, Spot) else key: (three(force) * unit, sticks)
-                for key, (force, sticks) in sample.rubbed.items()
-            }
-        if rubbing is None or rubs is None:
-            return {}
-        found = dict[str | Approach, tuple[Array, bool]]()
-        for k in np.flatnonzero(rubs.sticks + rubs.slides).tolist():
-            spot = self.unilateral.parts[rubbing.of[k]].spot
-            assert spot is not None
-            found[spot.name] = three(forces[k]) * unit, bool(rubs.sticks[k])
-        return found
+        forces = Forces(self, equations, free, loading, sample)
+        # Whether rows are redundant is decided in the order of time.
+        if self._redundant is not False or self.model.scene.hits:
+            forces.balanced()
+        fields = Fields(equations, free, loading, forces.balanced)
+        return MotionState(sample.t * self.time, fields, sample.t * self.time, sample, self, forces)
 
     @property
     def free(self) -> Equations:
@@ -144,9 +107,9 @@ class Mover:
             found = self._models[choice] = Equations(alone, kernels="interpreted")
         return found
 
-    def _balanced(self, equations: Equations, free: State, balanced: Any) -> State:
+    def balanced(self, equations: Equations, free: State, loading: Loading) -> State:
         """The state with internal forces that leave the least out of balance, and what is open by the rule for it."""
-        point, n = equations.at(free, balanced), equations.unknowns
+        point, n = equations.at(free, loading), equations.unknowns
         if not equations.rows:
             return free
         # Least squares of the residual, rows of the closings last.
@@ -158,7 +121,70 @@ class Mover:
         # What is straight where it begins may be bent later, but hardly the other way round.
         loose = loose_rows(equations, point)
         self._redundant = bool(loose.size)
-        return shared(equations, state, balanced, loose, reactions=True) if loose.size else state
+        return shared(equations, state, loading, loose, reactions=True) if loose.size else state
+
+
+class Forces:
+    """What acts in a sample: multipliers that balance all forces in least squares, found when they are first asked for.
+
+    Parameters
+    ----------
+    mover : Mover
+    equations, free, loading
+        Of the sample: equations, state without multipliers, loads.
+    sample : Sample
+    """
+
+    def __init__(self, mover: Mover, equations: Equations, free: State, loading: Loading, sample: Sample) -> None:
+        self._mover, self._equations, self._free, self._loading = mover, equations, free, loading
+        self._sample, self._system = sample, mover.inertia.system
+
+    def balanced(self) -> tuple[State, Loading]:
+        """The state with multipliers, and the loads with what inertia and dampers do, dimensionless."""
+        return self._found[:2]
+
+    @property
+    def friction(self) -> dict[str | Approach, tuple[Array, bool]]:
+        """Of places that stick or slide, by the names of their rows, forces (3,) along obstacles, N, and which do."""
+        return self._found[2]
+
+    @functools.cached_property
+    def _found(self) -> tuple[State, Loading, dict[str | Approach, tuple[Array, bool]]]:
+        equations, free, sample, rubbing = self._equations, self._free, self._sample, self._system.rubbing
+        inertia, friction = self._mover.inertia, np.zeros((0, 0))
+        effective = equations.effective(free, self._loading)
+        found = inertia.loading(equations, free, effective, inertia.forces(sample.v, sample.a))
+        if rubbing is not None and sample.rubs is not None:
+            friction = rubbed(rubbing, equations, free, found, sample)
+            found = pushed_along(rubbing, found, friction, rubbing.arms(sample.y, found.shift))
+        if sample.dragged.size:
+            found = dragged(equations, found, sample.dragged)
+        return self._mover.balanced(equations, free, found), found, self._of_rows(friction)
+
+    @functools.cached_property
+    def energies(self) -> tuple[float, float, float]:
+        """Kinetic energy, elastic energy, potential of the loads, dimensionless."""
+        point = self._equations.at(self._free, self._loading)
+        return self._mover.inertia.kinetic(self._sample.v), point.strain, point.potential - point.strain
+
+    def _of_rows(self, forces: Array) -> dict[str | Approach, tuple[Array, bool]]:
+        """Of forces (places, axes) along obstacles what :attr:`friction` tells."""
+        rubbing, rubs = self._system.rubbing, self._sample.rubs
+        unit = self._mover.model.scales.force
+        if self._sample.rubbed:
+            # Members may touch at several places whose rows have one name.
+            return {
+                key.name if isinstance(key, Spot) else key: (three(force) * unit, sticks)
+                for key, (force, sticks) in self._sample.rubbed.items()
+            }
+        if rubbing is None or rubs is None:
+            return {}
+        found = dict[str | Approach, tuple[Array, bool]]()
+        for k in np.flatnonzero(rubs.sticks + rubs.slides).tolist():
+            spot = self._mover.unilateral.parts[rubbing.of[k]].spot
+            assert spot is not None
+            found[spot.name] = three(forces[k]) * unit, bool(rubs.sticks[k])
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,20 +197,32 @@ class MotionState(Configuration):
         s; also its ``factor``.
     sample : Sample
         Rotations, displacements and their rates, dimensionless.
-    energies : tuple of float
-        Kinetic energy, elastic energy, potential of the loads, dimensionless; :attr:`energy` has them in N m.
-    friction : mapping
-        For what touches with friction, the name of the row of a place on an obstacle or where members are near to each
-        other, the force (3,) along the surfaces on the member or the first one, N, and whether it sticks.
+    mover : Mover
+        Made it.
+    forces : Forces
+        What acts.
     """
 
     where: ClassVar[str] = MOTION
 
     time: float
     sample: Sample = field(repr=False)
-    energies: tuple[float, float, float] = field(repr=False)
     mover: Mover = field(repr=False)
-    friction: Mapping[str | Approach, tuple[Array, bool]] = field(repr=False, default_factory=dict)
+    forces: Forces = field(repr=False)
+
+    @property
+    def energies(self) -> tuple[float, float, float]:
+        """Kinetic energy, elastic energy, potential of the loads, dimensionless; :attr:`energy` has them in N m."""
+        kinetic, strain, loads = self.forces.energies
+        return kinetic, strain, loads - self.fields.spent / self.model.scales.moment
+
+    @property
+    def friction(self) -> Mapping[str | Approach, tuple[Array, bool]]:
+        """What touches with friction, by the name of its row, of a place on an obstacle or where members are near.
+
+        The force (3,) along the surfaces on the member or the first one, N, and whether it sticks.
+        """
+        return self.forces.friction
 
     def __repr__(self) -> str:
         energy = ", ".join(f"{kind} {number_in_words(value)}" for kind, value in self.energy.items())

@@ -131,12 +131,6 @@ class Configuration:
     factor : float
         Factor that multiplies the loads and prescribed displacements; of a
         :class:`~sfetcas.dynamics.motion.MotionState` the time, s.
-    model : Model
-        The discretised scene.
-    state : State
-        Unknowns and multipliers, dimensionless.
-    loading : Loading
-        Loads and prescribed displacements, dimensionless.
     fields : Fields
         Evaluates the state.
     """
@@ -144,10 +138,22 @@ class Configuration:
     where: ClassVar[str] = STATICS
 
     factor: float
-    model: Model = field(repr=False)
-    state: State = field(repr=False)
-    loading: Loading = field(repr=False)
     fields: Fields = field(repr=False)
+
+    @property
+    def model(self) -> Model:
+        """The discretised scene."""
+        return self.fields.model
+
+    @property
+    def state(self) -> State:
+        """Unknowns and multipliers, dimensionless."""
+        return self.fields.state
+
+    @property
+    def loading(self) -> Loading:
+        """Loads and prescribed displacements, dimensionless; of a motion with what inertia and dampers do."""
+        return self.fields.loading
 
     def __repr__(self) -> str:
         return shown(self, [f"factor={self.factor:g}"], self._moved())
@@ -674,16 +680,13 @@ def equilibrium(
     )
     return Equilibrium(
         factor=float(found.factor),
-        model=model,
-        state=state,
-        loading=found.loading,
+        fields=found.fields,
         certificate=certificate,
         notes=(*notes, *_notes(found.fields)),
         iterations=iterations,
         strain=found.point.strain,
         potential=found.point.potential - found.fields.spent / model.scales.moment,
         way=way,
-        fields=found.fields,
     )
 
 

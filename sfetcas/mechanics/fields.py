@@ -8,6 +8,7 @@ first node of a member is minus the gradient of its energy there, and the rest f
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -67,18 +68,42 @@ class Fields:
     equations : Equations
     state : State
     loading : Loading
+    balanced : callable, optional
+        Gives the same state with multipliers, and the loading with what inertia and dampers do, when these are first
+        asked for: places and rotations do without.
     """
 
-    def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
-        self.model, self.state, self._applied = equations.model, state, loading
-        self._loading = loading = equations.acting(state, loading)
-        self._equations = equations
-        self.q = state.q
-        model = self.model
+    def __init__(
+        self,
+        equations: Equations,
+        state: State,
+        loading: Loading,
+        balanced: Callable[[], tuple[State, Loading]] | None = None,
+    ) -> None:
+        self.model, self._equations, self._placed = equations.model, equations, state
+        self._balanced, self.q, model = balanced or (lambda: (state, loading)), state.q, self.model
         self.turned = turned_tangents(model, state)
         gained = (self.turned - model.beams.tangent).sum(axis=1)
         nodal, _ = equations.displacements(state, loading, gained)
         self._nodal = nodal.reshape(len(model.segments.places), -1)
+
+    @functools.cached_property
+    def _in_balance(self) -> tuple[State, Loading]:
+        return self._balanced()
+
+    @property
+    def state(self) -> State:
+        """Unknowns and multipliers, dimensionless."""
+        return self._in_balance[0]
+
+    @property
+    def loading(self) -> Loading:
+        """Loads and prescribed displacements, dimensionless."""
+        return self._in_balance[1]
+
+    @functools.cached_property
+    def _loading(self) -> Loading:
+        return self._equations.acting(*self._in_balance)
 
     @property
     def displaced(self) -> Array:
@@ -130,7 +155,7 @@ class Fields:
     @functools.cached_property
     def balance(self) -> Balance:
         """Reactions, and the forces of springs and small members."""
-        return Balance(self._equations, self.state, self._applied, self._nodal)
+        return Balance(self._equations, self.state, self.loading, self._nodal)
 
     # -- nodes ----------------------------------------------------------------------------------
 
@@ -142,7 +167,7 @@ class Fields:
     def rotation(self, node: str) -> Array | None:
         """Quaternion (4,) or, in the plane, angle (1,) of a node since the undeformed scene; None if it has none."""
         number = self.model.rotations.node_turn[node]
-        return None if number is None else self.state.q[number]
+        return None if number is None else self.q[number]
 
     def motion_of(self, contact: str) -> tuple[Array, Array] | None:
         """How an obstacle has moved since the undeformed scene: the matrix (3, 3) of its rotation, and the place (3,) m
@@ -386,14 +411,14 @@ class Fields:
         axes = model.scene.center_lines[member].strained_axes(model.space)
         compliance = section.compliance(there.ravel())[:, axes].reshape(*there.shape, -1) * model.scales.force
         at, found = self._stations(member, x), np.zeros((len(x), 3))
-        own = scaled_strains(model, self.state.y)[part] * np.sqrt(compliance / weight[..., None])
+        own = scaled_strains(model, self._placed.y)[part] * np.sqrt(compliance / weight[..., None])
         found[:, axes] = np.einsum("np,npa->na", at.at_points, own[at.elements])
         return found
 
     def _branches(self, member: str, x: Array) -> tuple[Array, Array]:
         """Moments (n, 3), N m, about b1, b2, b3 of what has not yet relaxed, and strains (n, 3) by such forces."""
         model = self.model
-        found = carried(model, member, self.state.q, self.state.y)
+        found = carried(model, member, self.q, self._placed.y)
         if found is None:
             return np.zeros((len(x), 3)), np.zeros((len(x), 3))
         at = self._stations(member, x)
@@ -500,14 +525,14 @@ class Fields:
                 continue
             load = self._loading.loads[number - 1] if number else None
             batch = GroupBatch(self.model, group, energies_of(group.kind))
-            energies = batch(self.q, self._nodal, self.state.unwrapped, load)[1].ravel()
+            energies = batch(self.q, self._nodal, self._placed.unwrapped, load)[1].ravel()
             np.add.at(found, group.elements if number else np.arange(len(found)), energies)
         return found
 
     @functools.cached_property
     def dissipated(self) -> dict[str, float]:
         """What each member whose law has memory has dissipated since it was undeformed, J."""
-        return dissipated_along(self.model, self.q, self.state.y)
+        return dissipated_along(self.model, self.q, self._placed.y)
 
     @property
     def spent(self) -> float:
@@ -518,7 +543,7 @@ class Fields:
     @functools.cached_property
     def energies(self) -> tuple[float, float]:
         """Elastic energy, and potential of the loads since the undeformed scene, dimensionless."""
-        point = self._equations.at(self.state, self._applied)
+        point = self._equations.at(self.state, self.loading)
         return point.strain, point.potential - point.strain - self.spent / self.model.scales.moment
 
     def magnet(self, name: str) -> dict[str, Any]:
@@ -534,7 +559,7 @@ class Fields:
         for number, own in magnet_terms(model.connections, name):
             group = model.connections[number]
             batch = GroupBatch(model, group, answers_of(group.kind))
-            found.append(batch(self.q, self._nodal, self.state.unwrapped, loads[number])[0][own])
+            found.append(batch(self.q, self._nodal, self._placed.unwrapped, loads[number])[0][own])
         return np.concatenate(found)
 
     def placed(self, member: str, x: Array) -> tuple[Array, Array]:
@@ -542,7 +567,7 @@ class Fields:
         if self.model.scene.members[member].type == "small":
             found = self._along_body(member, x)
             return found["position"], found["rotation"]
-        return self.positions(member, x), rotations_along(self.model, self.state.q, member, x)
+        return self.positions(member, x), rotations_along(self.model, self.q, member, x)
 
     def _along(self, member: str, x: Array) -> dict[str, Array]:
         """Position (m), rotation, force and moment, dimensionless."""
@@ -567,7 +592,7 @@ class Fields:
             force[beyond] -= push
             arms = (position[beyond] - self.positions(member, np.array([place]))) / model.scales.length
             moment[beyond] -= np.cross(arms, -push)
-        rotation, taken = rotations_along(model, self.state.q, member, x), np.zeros_like(force)
+        rotation, taken = rotations_along(model, self.q, member, x), np.zeros_like(force)
         if stretches_of(model.scene, member):
             about, taken = self._strung(member, x, rotation, moment)
             moment, force = moment - about, force - taken
@@ -604,7 +629,7 @@ class Fields:
         natural = quaternion.rotate(frames, self.natural(member, x))[:, -turns:] * model.scales.length
         strain = np.zeros((len(x), model.element.axes))
         if model.element.strains:
-            gained = gained_tangents(model, self.state)[part] / model.beams.weight[part][..., None]
+            gained = gained_tangents(model, self._placed)[part] / model.beams.weight[part][..., None]
             strain = np.einsum("np,npa->na", at.at_points, gained[at.elements])
         given = (body[:, -turns:], guess, natural, strain, data, tensions)
         found = function(*(part.T for part in given))
@@ -659,7 +684,7 @@ class Fields:
         """How much longer than its free length at this load factor a tendon of given length is, m."""
         tendon, rest = self.model.scene.tendons[name], self.balance.rest_length(name)
         pull = (tendon.pull or 0.0) if tendon.length is None else rest - tendon.length
-        factor = self._applied.factor
+        factor = self.loading.factor
         if tendon.history is not None:
             factor = self.model.scene.histories[tendon.history].factor(factor)
         return float(self.balance.tendon(name)["length"] - rest + factor * pull)
@@ -674,7 +699,7 @@ class Fields:
         """Resultant of what acts from outside but for supports and obstacles, (3,) N: loads, weights, and the pulls of
         springs, tendons and fields.
         """
-        return _three(self._equations.outer_force(self.state, self._applied)) * self.model.scales.force
+        return _three(self._equations.outer_force(self.state, self.loading)) * self.model.scales.force
 
     def stiffness(self, member: str, x: float) -> float:
         """Smallest bending stiffness of a member's section at a fraction of its length, dimensionless."""
@@ -692,7 +717,7 @@ class Fields:
 
     def tangents(self, member: str, x: Array) -> Array:
         """Unit tangents (n, 3) of the centre line, fixed axes, at fractions x (n,) of the length."""
-        return self._tangents(member, x, rotations_along(self.model, self.state.q, member, x))
+        return self._tangents(member, x, rotations_along(self.model, self.q, member, x))
 
     def slopes(self, member: str, x: Array) -> Array:
         """Derivatives (n, 3) of :meth:`positions` by the undeformed arc length, fixed axes, at fractions x (n,).
@@ -806,7 +831,7 @@ class Fields:
         lengths = model.beams.weight[part].sum(axis=1)[at.elements] * model.scales.length
         slope = np.einsum("nj,njc->nc", at.slopes, nodal) / lengths[:, None]
         if model.space:
-            rotation = rotations_along(model, self.state.q, member, x)
+            rotation = rotations_along(model, self.q, member, x)
             spin = 2.0 * quaternion.multiply(quaternion.conjugate(rotation), slope)[:, 1:]
         else:
             spin = np.pad(slope, ((0, 0), (2, 0)))
@@ -847,7 +872,7 @@ class Fields:
         numbers = [ends[0], ends[-1]]
         places = [model.segments.place(model.segments.ends[member, i]) for i in (0, len(ends) - 1)]
         moved = _three(self._nodal[places]) * model.scales.length
-        turned = self.state.q[numbers]
+        turned = self.q[numbers]
         if not model.space:
             turned = quaternion.from_rotation_vector(np.pad(turned, ((0, 0), (2, 0))))
         signed = turned[1] * (1.0 if turned[0] @ turned[1] >= 0.0 else -1.0)
@@ -868,10 +893,7 @@ class Fields:
         position = rigid[1:-1] + bent[:, None] * miss + hermite
         wrenches = self.balance.body_ends(member)
         force, moment = ((1.0 - x)[:, None] * -wrenches[0][k] + x[:, None] * wrenches[-1][k] for k in range(2))
-        if model.space:
-            rotation = mixed
-        else:
-            rotation = ((1.0 - x) * self.state.q[ends[0], 0] + x * self.state.q[ends[-1], 0])[:, None]
+        rotation = mixed if model.space else ((1.0 - x) * self.q[ends[0], 0] + x * self.q[ends[-1], 0])[:, None]
         scaled = {"force": force * model.scales.force, "moment": moment * model.scales.moment}
         return {"position": position, "rotation": rotation, **scaled, "curvature": line.curvatures(x)}
 
@@ -891,7 +913,7 @@ class Fields:
         for count in {len(member.nodes) for member in members.values()}:
             names = [name for name, member in members.items() if len(member.nodes) == count]
             rest, now = (np.array(places) for places in zip(*map(self._ends, names), strict=True))
-            turned = self.state.q[[model.rotations.ends[name] for name in names]]
+            turned = self.q[[model.rotations.ends[name] for name in names]]
             if not model.space:
                 # From the mean angle: quaternions of angles that differ by turns would not tell their mean.
                 mean = quaternion.from_rotation_vector(_about_z(turned.mean(axis=1)))

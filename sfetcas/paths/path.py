@@ -299,7 +299,7 @@ class Path:
     def configuration(self, point: PathPoint) -> Configuration:
         """The state at a point with positions, forces and reactions by name: an equilibrium without a certificate."""
         fields = self.fields(point)
-        return Configuration(point.factor, fields.model, point.state, point.loading, fields)
+        return Configuration(point.factor, fields)
 
     def positions(self, node: str, branch: int = 0) -> Array:
         """Positions of a node along the path or a branch, (points, 3) m."""
