@@ -156,6 +156,9 @@ IN, OUT, CONSTANT, ASSIGN, SPLINE = map(NAMES.index, ("IN", "OUT", "CONSTANT", "
 COMMUTATIVE = frozenset(map(NAMES.index, ("ADD", "MUL")))
 """Operations that give the same bits in either order."""
 
+PUTS, TAKES_NONE = frozenset((OUT, ASSIGN)), frozenset((IN, CONSTANT, SPLINE))
+"""Operations that put the value b somewhere, and those that take no values; all others take two."""
+
 
 class _Reader:
     """The operations of a function, with those of what it calls in the place of each call, and equal ones once.
@@ -189,26 +192,33 @@ class _Reader:
 
     def code(self) -> tuple[Array, int]:
         """The operations whose values anything takes, see :class:`Tape`, and how many slots they need."""
-        last = dict[int, int]()
-        for k in range(len(self._operations) - 1, -1, -1):
-            if k in last or self._operations[k][0] in (OUT, ASSIGN):
-                for value in _taken(*self._operations[k]):
-                    last.setdefault(value, k)
-        slots, unused, slot, found = self._held, list[int](), dict[int, int](), list[tuple[int, int, int, int]]()
-        for k, (kind, a, b) in enumerate(self._operations):
-            if k not in last and kind not in (OUT, ASSIGN):
+        operations, last = self._operations, [-1] * len(self._operations)
+        for k in range(len(operations) - 1, -1, -1):
+            kind, a, b = operations[k]
+            if kind in PUTS or (kind not in TAKES_NONE and last[k] >= 0):
+                last[b] = k if last[b] < 0 else last[b]
+                if kind not in PUTS and last[a] < 0:
+                    last[a] = k
+        slots, unused, slot, found = self._held, list[int](), [-1] * len(last), list[tuple[int, int, int, int]]()
+        for k, (kind, a, b) in enumerate(operations):
+            if kind in PUTS:
+                found.append((kind, a, slot[b], slot[b]))
+                if last[b] == k:
+                    unused.append(slot[b])
                 continue
-            values = _taken(kind, a, b)
-            sources = [slot[value] for value in values]
-            unused += [slot.pop(value) for value in set(values) if last[value] == k]
-            if kind in (OUT, ASSIGN):
-                found.append((kind, a, sources[0], sources[0]))
+            if last[k] < 0:
                 continue
+            taken = (a, b) if kind in TAKES_NONE else (slot[a], slot[b])
+            if kind not in TAKES_NONE:
+                if last[a] == k:
+                    unused.append(slot[a])
+                if last[b] == k and a != b:
+                    unused.append(slot[b])
             if not unused:
                 unused.append(slots)
                 slots += 1
             slot[k] = unused.pop()
-            found.append((kind, slot[k], *((sources[0], sources[1]) if sources else (a, b))))
+            found.append((kind, slot[k], *taken))
         return np.array(found, np.int32).reshape(-1, 4), slots
 
     def read(self, function: ca.Function, given: Sequence[int] | None = None) -> list[int]:
@@ -225,9 +235,20 @@ class _Reader:
         inputs = np.cumsum([0, *(scalar.nnz_in(i) for i in range(scalar.n_in()))]).tolist()
         outputs = np.cumsum([0, *(scalar.nnz_out(i) for i in range(scalar.n_out()))]).tolist()
         found, held, nodes = [0] * outputs[-1], [0] * scalar.sz_w(), None
+        kind_of, results_of, taken_by = scalar.instruction_id, scalar.instruction_output, scalar.instruction_input
+        values, operations, plain = self._known, self._operations, {*known} - {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST}
         for k in range(scalar.n_instructions()):
-            theirs, to, by = scalar.instruction_id(k), scalar.instruction_output(k), scalar.instruction_input(k)
-            if theirs == ca.OP_CALL:
+            theirs, to, by = kind_of(k), results_of(k), taken_by(k)
+            if theirs in plain:
+                kind, a, b = known[theirs], held[by[0]], held[by[-1]]
+                if kind in COMMUTATIVE and b < a:
+                    a, b = b, a
+                # As of _value, which would take half of the time.
+                value = a if kind == ASSIGN else values.setdefault((kind, a, b), len(operations))
+                if value == len(operations):
+                    operations.append((kind, a, b))
+                held[to[0]] = value
+            elif theirs == ca.OP_CALL:
                 nodes = scalar.instructions_sx() if nodes is None else nodes
                 results = self._called(nodes[k].which_function(), [held[one] for one in by])
                 for one, value in zip(to, results, strict=True):
@@ -244,10 +265,7 @@ class _Reader:
             elif theirs == ca.OP_CONST:
                 held[to[0]] = self._constant(scalar.instruction_constant(k))
             else:
-                kind, a, b = known[theirs], held[by[0]], held[by[-1]]
-                if kind in COMMUTATIVE and b < a:
-                    a, b = b, a
-                held[to[0]] = a if kind == ASSIGN else self._value(kind, a, b)
+                raise KeyError(theirs)
         return found
 
     def _value(self, kind: int, a: int, b: int) -> int:
@@ -281,10 +299,3 @@ class _Reader:
             row = (self._splines.index(spline), number % spline.components, *along)
             rows.append(self._rows.setdefault(row, len(self._rows)))
         return [self._value(SPLINE, place, 5 * row) for row in rows]
-
-
-def _taken(kind: int, a: int, b: int) -> tuple[int, ...]:
-    """Numbers of the values that an operation takes."""
-    if kind in (IN, CONSTANT, SPLINE):
-        return ()
-    return (b,) if kind in (OUT, ASSIGN) else (a, b)
