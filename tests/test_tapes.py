@@ -1,5 +1,6 @@
 """Tapes in the cache: the same as those that CasADi tells, whatever lies there."""
 
+import gc
 import os
 
 import casadi as ca
@@ -195,6 +196,15 @@ def test_beyond_the_grid_splines_go_on_straight():
     at, nearer, far = Many(function)(end + np.array([[0.0, 0.0], [0.5, 0.0], [2.0, 0.0]]))
     np.testing.assert_allclose(far - at, 4.0 * (nearer - at), atol=1e-12 * np.abs(far).max())
     assert np.isnan(Many(function)(np.array([[np.nan, 1.0]]))).all()
+
+
+def test_splines_are_known_as_long_as_an_equal_one_lives():
+    through, other = spline(2)[0], spline(2)[0]
+    place = ca.SX.sym("place", 2)
+    function = ca.Function("spline", [place], [through(place)])
+    del other
+    gc.collect()
+    assert tape_of(function) is not None
 
 
 def test_tapes_with_splines_are_kept(folder):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import weakref
 from collections.abc import Sequence
@@ -36,6 +37,12 @@ class Knotted:
     values: Array
     components: int
 
+    @functools.cached_property
+    def name(self) -> str:
+        """The same for all that are the same function."""
+        content = repr((self.components, [knots.tolist() for knots in self.knots], self.values.tolist()))
+        return f"spline_{hashlib.sha256(content.encode()).hexdigest()[:24]}"
+
 
 _SPLINES = weakref.WeakValueDictionary[str, Knotted]()
 
@@ -54,10 +61,7 @@ def _derivatives(spline: Knotted) -> list[ca.Function]:
 
     They stay calls in expressions, so that what runs these may know what a spline is, see :func:`spline_of`.
     """
-    axes, values = len(spline.knots), spline.values.tolist()
-    content = repr((spline.components, [knots.tolist() for knots in spline.knots], values))
-    name = f"spline_{hashlib.sha256(content.encode()).hexdigest()[:24]}"
-    _SPLINES[name] = spline
+    axes, name, values = len(spline.knots), spline.name, spline.values.tolist()
     knots, place = [one.tolist() for one in spline.knots], ca.MX.sym("place", axes)
     found = [ca.Function.bspline("value", knots, values, [3] * axes, spline.components)(place)]
     for _ in range(HIGHEST):
@@ -95,7 +99,9 @@ class GridSpline:
         for axis, places in enumerate(grid[::-1]):
             spline = make_interp_spline(places, values, axis=axis)
             values, knots = np.moveaxis(spline.c, 0, axis), [spline.t, *knots]
-        self._spline = Knotted(tuple(knots), values.ravel(), components)
+        found = Knotted(tuple(knots), values.ravel(), components)
+        # One for all that are equal: functions of one are known as long as any of them lives.
+        self._spline = _SPLINES.setdefault(found.name, found)
         self._value, self._slopes = _derivatives(self._spline)[:2]
 
     def __call__(self, place: Any) -> Any:
