@@ -10,6 +10,7 @@ from scenes import SOFT, made
 
 from sfetcas import Scene, SceneError, SolveError, Status, find, load, solve
 from sfetcas.contact.closest import Closest
+from sfetcas.contact.member_contact import MemberContact
 from sfetcas.description.obstacles import obstacle
 from sfetcas.description.scene import Contact
 from sfetcas.equilibria.quantities import value_of
@@ -1387,3 +1388,32 @@ def test_strip_that_is_pushed_together_and_lifted_does_not_hang_on_its_first_ste
     assert all(step.certificate.stable and not step.notes for step in (*once.steps, *again.steps))
     # Ten times the accuracy, times loads and size of the scene.
     assert once.last.energy["total"] == pytest.approx(again.last.energy["total"], abs=1e-5 * 12 * 3)
+
+
+def test_strip_between_floor_and_ceiling_is_pressed_flat():
+    """Its hump touches the ceiling on the way; on the coarse mesh of the way it would dip into the floor beside it."""
+    table = pushed_together(0.2, 0.0)
+    ceiling = {"type": "plane", "point": [0, 0.2], "normal": [0, -1], "member": "m"}
+    table["contacts"] = {**table["contacts"], "ceiling": ceiling}
+    coarse, fine = (solve(made(table), accuracy=accuracy).last for accuracy in (1e-4, 1e-6))
+    assert fine.certificate.stable
+    # The accuracy, times the size of the scene.
+    assert smallest_gap(fine) > -1e-6 * 3.0
+    up = sum(np.reshape(entry["force"], (-1, 3))[:, 1].sum() for entry in fine.contacts.values())
+    up += sum(fine.reaction(name)[0][1] for name in "AB")
+    # Newton's method leaves 1e-11 of forces of order 100.
+    assert up == pytest.approx(12.0, abs=1e-8)
+    # The coarser accuracy, times the weight and the size of the scene.
+    assert coarse.energy["total"] == pytest.approx(fine.energy["total"], abs=1e-4 * 12 * 3)
+
+
+def test_steps_from_a_coarse_state_that_dips_into_the_floor_are_taken(monkeypatch):
+    """Its mesh is refined: no step would be short enough."""
+    taken, stepped = [], MemberContact.stepped
+    monkeypatch.setattr(MemberContact, "stepped", lambda *a, **k: taken.append(stepped(*a, **k)) or taken[-1])
+    table = pushed_together(0.3, 0.0)
+    again = solve(made({**table, "analysis": {**table.get("analysis", {}), "steps": [2 / 3, 1.0]}})).last
+    assert again.certificate.stable
+    # Of some dozen steps; a hundred were tried in vain from the coarse state.
+    assert sum(there is None for there in taken) < 10
+    assert smallest_gap(again) > -1e-4 * 3.0

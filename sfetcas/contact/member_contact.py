@@ -127,6 +127,9 @@ BETWEEN = 0.1
 elements are divided on the way: else they pass each other there.
 """
 
+NEARLY = 0.5
+"""Share of the depth below at the begin of a step from which on a finer mesh, not a shorter step, is what it needs."""
+
 WITHIN = 1e-3
 """Depth, over the size, to which members that lie along an obstacle may be inside of it between ends of elements in a
 step of the way: pressure that is linear along coarse elements leaves some 2e-4, an element in which a line ends and no
@@ -927,6 +930,9 @@ class MemberContact:
         SolveError
             The way leads beyond what the scene describes, see :meth:`.Fields.beyond_limits`.
         """
+        if self._dips(start.fields):
+            # No step from there would be taken, however short it is.
+            start = self._refined(start, way(0.0)) or start
         self.jumps, self.beside, self.falls, mesh = [], [], 0, replace(start.model.mesh, points=())
         self.stood = False
         unstable: _Step | None = None
@@ -1015,12 +1021,22 @@ class MemberContact:
             crossings = [] if there is None else self.passing.crossed(now.fields, there.fields)
         if there is None or crossings:
             return None
-        lined = [self.closest.pairs[key] for key in sorted(self.lines.keys) if self.lines.chosen(key)]
-        if self.penetration(there.fields, lined) > WITHIN * self.scene.size:
-            return None
+        if self._dips(there.fields):
+            # Where it nearly did so before, shorter steps would dip as deep: elements are too long.
+            finer = self._refined(there, way) if self._dips(now.fields, NEARLY) else None
+            if finer is None or self._dips(finer.fields):
+                return None
+            there = finer
         far = tangents_turned(now.fields, there.fields) > self.stride or self._swung(now, there) > SWUNG
         through = self.passing.swept(now.fields, there.fields) or bool(self.passing.crossed(there.fields, now.fields))
         return None if far or through else there
+
+    def _dips(self, fields: Fields, share: float = 1.0) -> list[Near]:
+        """Where members dip into what they lie along, between places where nothing stops them, by a share of what steps
+        may leave or more.
+        """
+        lined = [self.closest.pairs[key] for key in sorted(self.lines.keys) if self.lines.chosen(key)]
+        return [near for near in self.closest.found(fields, 0.0, lined) if near.gap < -share * WITHIN * self.scene.size]
 
     def _fallen_from(self, mesh: Mesh, now: _Step, part: float, way: Way) -> Solved | None:
         """Where a state comes to rest a little further on its way, where none is near to it; None where it does not."""
@@ -1043,8 +1059,10 @@ class MemberContact:
             rough, model = roughness(found.fields) > self.rough, found.model
             marks = {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
             between = [self.closest.pairs[key] for key in sorted(self.lines.keys) if len(key[1]) == 2]
-            for near in self.closest.found(found.fields, 0.0, between):
-                if near.gap < -BETWEEN * near.distance and near.members[0] not in self.fixed:
+            near_each_other = self.closest.found(found.fields, 0.0, between)
+            deep = [near for near in near_each_other if near.gap < -BETWEEN * near.distance]
+            for near in (*deep, *self._dips(found.fields)):
+                if near.members[0] not in self.fixed:
                     marks[near.members[0]][model.mesh.element_at(near.members[0], near.at[0])] = True
             if not any(marked.any() for marked in marks.values()):
                 return found
