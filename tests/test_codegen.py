@@ -259,6 +259,15 @@ def test_compliance_is_what_a_small_load_does():
         assert found["compliance.B"][2, i] == pytest.approx(turned, rel=1e-6, abs=1e-7)
 
 
+def test_arguments_of_another_shape_are_refused_with_a_sentence():
+    solver = equilibrium_solver(beam(), "c", arguments=["factor", "loads.tip.value"])
+    count = solver.arguments.defaults.size
+    for wrong in ([0.4], 0.4, np.ones(count + 1), np.ones((count, 1)), []):
+        accepted = rf"arguments: found an array of shape \(.*\), accepted: \({count},\), for factor, loads\.tip\.value"
+        with pytest.raises(ValueError, match=accepted):
+            solver.solve(wrong)
+
+
 def test_default_arguments():
     assert default_arguments(beam()) == ["factor", "loads.tip.value"]
     assert argument(beam(), "loads.tip.value").default == (0.3, 4.0)

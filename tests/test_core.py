@@ -253,7 +253,9 @@ def test_a_start_of_another_length_is_refused():
     method = Globalised(Inputs(prepared.equations), prepared.weight)
     row = method.inputs.of(prepared.model.loading(1.0))
     for size in (0, method.states - 1, method.states + 1):
-        with pytest.raises(ValueError, match=f"start: found {size} numbers, accepted: {method.states}"):
+        with pytest.raises(
+            ValueError, match=rf"start: found an array of shape \({size},\), accepted: \({method.states},\)"
+        ):
             method(row, np.zeros(size))
 
 

@@ -65,6 +65,25 @@ def test_as_the_function(dimension):
     assert abs(one.position("B")[1]) > 0.1
 
 
+@pytest.mark.parametrize("slope", [0.0, 1e-12, 1e-8])
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_all_but_uniform_tables_are_as_uniform_fields(dimension, slope):
+    """What forces are then is rounding, beside which nothing else acts at the places of the magnets."""
+    random = np.random.default_rng(3)
+    for _ in range(3):
+        value = random.uniform(-0.05, 0.05, 3) * [1.0, 1.0, dimension == "space"]
+
+        def nearly(x, value=value):
+            return [value[0] + slope * x[0], value[1] - slope * x[1], value[2] + 0.0 * x[2]]
+
+        one = sfetcas.solve(strip({"type": "uniform", "value": value.tolist()}, dimension, accuracy=1e-5)).last
+        other = {"type": "table", "table": table(nearly, z=dimension == "space", high=1.2)}
+        steps = sfetcas.solve(strip(other, dimension, accuracy=1e-5, steps=[0.05, 0.5, 1.0])).steps
+        # The accuracy of two meshes.
+        np.testing.assert_allclose(steps[-1].position("B"), one.position("B"), atol=2e-5)
+        assert all(step.certificate.stable for step in steps)
+
+
 def test_the_file(tmp_path):
     """Columns of a CSV file beside the scene, rows in any order."""
     columns = table()
@@ -119,6 +138,16 @@ def test_exported_steps(tmp_path):
     moving = strip(given(), accuracy=1e-3, type="dynamic", end=1.0, step=0.01)
     sfetcas.export(moving, tmp_path / "motion", name="motion")
     assert "10 of 10 steps agree, 10 of them to the last bit" in said(built(tmp_path / "motion", "motion"))
+
+
+def test_derivatives_of_all_results_are_numbers():
+    """That answers beyond a table are none must not reach derivatives within it."""
+    names = ["members.m.moment", "members.m.curvature", "magnets.k.energy", "energy.loads", "nodes.B.position"]
+    one, other = (sfetcas.parametric(strip(field), ["factor"], names).solve({}) for field in (FUNCTION, given()))
+    for name in names:
+        expected = one.jacobian[name]["factor"]
+        assert np.abs(expected).max() > 1e-3
+        np.testing.assert_allclose(other.jacobian[name]["factor"], expected, rtol=1e-7, atol=1e-9)
 
 
 LEAVING = given(high=0.2)

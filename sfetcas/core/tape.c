@@ -62,13 +62,9 @@ static double sf_other(int operation, double x, double y) {
   }
 }
 
-/* The cubic splines of n coefficients that are not zero at x, differentiated order times; returns the number of the first.
- *
- * Beyond the knots they go on as they are in the last interval.
- */
-static int sf_basis(int n, const double *knot, double x, int order, double *value) {
-  int low = 3, high = n, degree, i, j;
-  const double *t;
+/* The interval of knots, of n cubic splines, that x is in; beyond them the last one on that side. */
+static int sf_interval(int n, const double *knot, double x) {
+  int low = 3, high = n;
   while (high - low > 1) {
     int middle = (low + high) / 2;
     if (x < knot[middle])
@@ -76,49 +72,70 @@ static int sf_basis(int n, const double *knot, double x, int order, double *valu
     else
       low = middle;
   }
-  t = knot + low;
-  for (i = 1; i < 4; ++i) value[i] = 0.0;
-  value[0] = order > 3 ? 0.0 : 1.0;
-  for (degree = 1; degree < 4; ++degree) {
+  return low;
+}
+
+/* The splines of a degree that are not zero at x between t[0] and t[1], from the first on (Cox, de Boor). */
+static void sf_basis(const double *t, double x, int degree, double *value) {
+  int d, j;
+  value[0] = 1.0;
+  for (d = 1; d <= degree; ++d) {
     double last = 0.0;
-    /* Splines of one degree less, from the first to the last, each take from two of these (Cox, de Boor). */
-    for (j = 0; j < degree; ++j) {
-      const double left = t[j + 1 - degree], right = t[j + 1], share = value[j] / (right - left);
-      if (degree > 3 - order) {
-        value[j] = degree * (last - share);
-        last = share;
-      } else {
-        value[j] = last + (right - x) * share;
-        last = (x - left) * share;
-      }
+    for (j = 0; j < d; ++j) {
+      const double left = t[j + 1 - d], right = t[j + 1], share = value[j] / (right - left);
+      value[j] = last + (right - x) * share;
+      last = (x - left) * share;
     }
-    value[degree] = degree > 3 - order ? degree * last : last;
+    value[d] = last;
   }
-  return low - 3;
+}
+
+/* Coefficients of the derivative of an order along one axis, in place of four cubic ones each, which stand apart by a
+ * step among size of them.  Differences of coefficients keep the digits of what varies little. */
+static void sf_differentiate(double *value, int size, int step, const double *t, int order) {
+  int degree, j, a, b;
+  for (degree = 3; degree > 3 - order; --degree)
+    for (j = 0; j < degree; ++j) {
+      const double share = degree / (t[j + 1] - t[j + 1 - degree]);
+      for (a = j * step; a < size; a += 4 * step)
+        for (b = a; b < a + step; ++b) value[b] = share * (value[b + step] - value[b]);
+    }
 }
 
 /* A component of a derivative of a spline at a place, whose coordinates stand apart by a stride.
  *
- * what: where in tape->spline the spline is, component, orders along each axis.  The spline: axes, components,
- * coefficients along each axis, and where its knots begin among the constants; its coefficients follow them.
+ * what: where in tape->spline the spline is, component, orders along each axis, at most three.  The spline: axes,
+ * components, coefficients along each axis, and where its knots begin among the constants; its coefficients follow them.
  */
 static double sf_look_up(const sf_tape *tape, const int *what, const double *place, int stride) {
   const int *shape = tape->spline + what[0], axes = shape[0], components = shape[1];
-  const double *number = tape->constant + shape[2 + axes];
-  double value[3][4] = {{1.0}, {1.0}, {1.0}}, sum = 0.0;
-  int first[3] = {0, 0, 0}, many[3] = {1, 1, 1}, size[3] = {1, 1, 1}, i, j, k;
+  const double *number = tape->constant + shape[2 + axes], *t[3] = {0, 0, 0};
+  double basis[3][4] = {{1.0}, {1.0}, {1.0}}, value[64], sum = 0.0;
+  int first[3] = {0, 0, 0}, many[3] = {1, 1, 1}, width[3] = {1, 1, 1}, size = 1, i, j, k;
   for (i = 0; i < axes; ++i) {
-    size[i] = shape[2 + i];
-    first[i] = sf_basis(size[i], number, place[(size_t)i * stride], what[2 + i], value[i]);
-    number += size[i] + 4;
+    const double x = place[(ptrdiff_t)i * stride];
+    const int low = sf_interval(shape[2 + i], number, x);
+    width[i] = shape[2 + i];
+    first[i] = low - 3;
+    t[i] = number + low;
+    sf_basis(t[i], x, 3 - what[2 + i], basis[i]);
+    number += width[i] + 4;
     many[i] = 4;
+    size *= 4;
   }
   for (k = 0; k < many[2]; ++k)
     for (j = 0; j < many[1]; ++j)
       for (i = 0; i < many[0]; ++i) {
-        const size_t at = ((size_t)(first[2] + k) * size[1] + first[1] + j) * size[0] + first[0] + i;
-        sum += value[2][k] * value[1][j] * value[0][i] * number[at * components + what[1]];
+        const ptrdiff_t at = ((ptrdiff_t)(first[2] + k) * width[1] + first[1] + j) * width[0] + first[0] + i;
+        value[(4 * k + j) * 4 + i] = number[at * components + what[1]];
       }
+  for (i = 0, j = 1; i < axes; ++i, j *= 4) {
+    sf_differentiate(value, size, j, t[i], what[2 + i]);
+    many[i] = 4 - what[2 + i];
+  }
+  for (k = 0; k < many[2]; ++k)
+    for (j = 0; j < many[1]; ++j)
+      for (i = 0; i < many[0]; ++i) sum += basis[2][k] * basis[1][j] * basis[0][i] * value[(4 * k + j) * 4 + i];
   return sum;
 }
 

@@ -191,8 +191,17 @@ class EquilibriumSolver:
         ----------
         arguments : (numbers,), by default those of the scene
         start : (states,), state to begin with, for a warm start
+
+        Raises
+        ------
+        ValueError
+            Arguments, or the start, have another shape.
         """
-        p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
+        defaults = self.arguments.defaults
+        p = defaults if arguments is None else np.atleast_1d(np.asarray(arguments, dtype=float))
+        if p.shape != defaults.shape:
+            names = ", ".join(one.name for one in self.arguments.arguments)
+            raise ValueError(f"arguments: found an array of shape {p.shape}, accepted: {defaults.shape}, for {names}")
         outcome = self.found(p, start)
         nothing = np.full(self.results.size, np.nan)
         if outcome.code not in SOLVED:

@@ -391,9 +391,7 @@ class Results:
         found = ca.vertcat(*(ca.densify(ca.vec(outputs.value(result.asked).T)) for result in self.results))
         # Where a magnet is beyond the table of a field there are no answers.
         beyond = outputs.beyond()
-        return (
-            found if beyond is None else found + ca.stop_diff(ca.if_else(beyond > tolerances.WRITTEN, np.nan, 0.0), 1)
-        )
+        return found if beyond is None else ca.if_else(beyond > tolerances.WRITTEN, np.nan, found)
 
 
 class Outputs:

@@ -437,7 +437,8 @@ class Globalised:
             The start has another length.
         """
         if start is not None and np.shape(start) != (self.states,):
-            raise ValueError(f"start: found {np.size(start)} numbers, accepted: {self.states}, a state of this solver")
+            found, accepted = np.shape(start), f"({self.states},), a state of this solver"
+            raise ValueError(f"start: found an array of shape {found}, accepted: {accepted}")
         return self._by_core(row, start, warm=warm) or self._step_by_step(row, start, warm=warm)
 
     def _step_by_step(self, row: Array, start: Array | None, *, warm: bool) -> Outcome:
