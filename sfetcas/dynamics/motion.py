@@ -89,7 +89,8 @@ class Mover:
         if self._redundant is not False or self.model.scene.hits:
             forces.balanced()
         fields = Fields(equations, free, loading, forces.balanced)
-        return MotionState(sample.t * self.time, fields, sample.t * self.time, sample, self, forces)
+        seconds = sample.t * self.time
+        return MotionState(factor=seconds, fields=fields, time=seconds, sample=sample, mover=self, forces=forces)
 
     @property
     def free(self) -> Equations:
