@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
 
 from .arrays import Array
 from .core import core, doubles, table_of
+from .kernels import Direct
 from .tapes import tape_of
 
 __all__ = ["Many"]
@@ -25,7 +25,7 @@ class Many:
     """
 
     def __init__(self, function: ca.Function) -> None:
-        self._function, self._library = function, core()
+        self._single, self._library = Direct(function), core()
         self.results = int(function.numel_out(0))
         tape = tape_of(function) if self._library is not None else None
         self._tape = None if tape is None else table_of(tape)
@@ -37,18 +37,11 @@ class Many:
         if not count:
             return found
         if self._library is None or self._tape is None:
-            return self._by_casadi(arguments, found)
+            for i, row in enumerate(zip(*arguments, strict=True)):
+                found[i] = self._single(*row)
+            return found
         given = doubles(np.concatenate(arguments, axis=1))
         address = ctypes.addressof(self._tape[0])
         work = np.empty(self._library.sf_tape_work(address))
         self._library.sf_run(address, count, given.ctypes.data, found.ctypes.data, work.ctypes.data)
-        return found
-
-    def _by_casadi(self, arguments: Sequence[Array], found: Array) -> Array:
-        for i, row in enumerate(zip(*arguments, strict=True)):
-            try:
-                found[i] = np.array(self._function(*row)).ravel()
-            except RuntimeError:
-                # A stiffness of what is singular.
-                found[i] = np.nan
         return found

@@ -45,6 +45,7 @@ class Knotted:
 
 
 _SPLINES = weakref.WeakValueDictionary[str, Knotted]()
+"""Splines that are alive, by their names: a function of CasADi's that is called somewhere tells no more than a name."""
 
 
 def spline_of(function: ca.Function) -> tuple[Knotted, int] | None:
