@@ -5,6 +5,7 @@ import pytest
 from scenes import CARRIED, CROSSING
 
 from sfetcas import Scene, SceneError, SolveError, Status, solve
+from sfetcas.dynamics.modes import BLURRED
 from sfetcas.mechanics.displacements import Displacements
 
 FLOOR = {"type": "plane", "point": [0, -0.3], "normal": [0, 1]}
@@ -174,7 +175,8 @@ def test_place_rolls_over_the_node_between_two_members():
 def test_what_does_not_touch_moves_freely():
     far = modes_of({**FLOOR, "point": [0, -3]})
     free = solve(Scene.from_dict({**table(FLOOR), "contacts": {}}))
-    assert far.omega == pytest.approx(free.omega, rel=1e-12)
+    # First meshes are graded towards what may be touched: rounding differs as that of frequencies on two meshes does.
+    assert far.omega == pytest.approx(free.omega, rel=BLURRED)
     assert not far.notes
 
 

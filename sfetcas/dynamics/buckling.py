@@ -66,7 +66,7 @@ def buckling_factors(prepared: Prepared, count: int) -> Array:
     def apply(block: Array) -> Array:
         return np.asarray(equations.solver.solve(-(change @ block)))
 
-    inverse, _ = largest(apply, equations.total, BOTH_SIDES * count)
+    inverse, _ = largest(apply, equations.total, BOTH_SIDES * count, symmetric=prepared.model.conservative)
     sizes = np.abs(inverse)
     turned = largest_rotation(equations, start.tangent.z) / abs(start.tangent.factor)
     certain = sizes > FAR * max(turned, sizes.max(initial=0.0))

@@ -40,7 +40,7 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.fields import transferred
 from ..mechanics.loading import Loading
 from ..mechanics.margins import undecided
-from ..mechanics.mesh import Mesh
+from ..mechanics.mesh import Mesh, every_other
 from ..mechanics.model import assemble
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.sides import Sides
@@ -69,8 +69,8 @@ __all__ = [
 ORDER = 6
 """Polynomial order p of the elements: each halving divides the error of a frequency by about 2^(2 p)."""
 
-HALVINGS = 7
-"""Halvings of the mesh at most."""
+HALVINGS, LEVELS = 7, 40
+"""Halvings of the whole mesh, and before of what is rough on it, at most."""
 
 MOST_ELEMENTS = 4000
 """A mesh that is halved does not grow beyond this."""
@@ -321,6 +321,7 @@ class ModalAnalysis:
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.rest = self._equilibrium()
         self.kept = self._kept()
+        self._flexible = {name for name, member in scene.members.items() if member.type == "flexible"}
 
     def _equilibrium(self) -> Equilibrium | None:
         """The equilibrium of the loads; None where there are none."""
@@ -358,12 +359,14 @@ class ModalAnalysis:
         return kept
 
     def _mesh(self) -> Mesh:
-        named = self.settings.element or any(member.element for member in self.scene.members.values())
         mesh = self.meshing.target
         if self.rest is not None:
-            cuts = self.rest.model.mesh.cuts if self.kept is None else self.kept.cuts()
+            # All elements were halved at the end, to see the error.
+            fixed, cuts = self.meshing.fixed, self.rest.model.mesh.cuts
+            coarse = {n: own if n in fixed else every_other(self.scene, n, own) for n, own in cuts.items()}
+            cuts = coarse if self.kept is None else self.kept.cuts()
             mesh = replace(mesh, cuts=cuts, stops=self.rest.model.mesh.stops)
-        return replace(mesh, order=mesh.order if named else ORDER, places=True)
+        return replace(mesh, order=mesh.order if self.meshing.named else ORDER, places=True)
 
     def modes(self) -> Modes:
         """The modes on the finest mesh that was needed, with their estimated error.
@@ -374,35 +377,54 @@ class ModalAnalysis:
             The equilibrium could not be transferred to a mesh, or the eigenvalue problem could not be solved.
         """
         begin = time.perf_counter()
-        fixed, mesh = self.meshing.fixed, self._mesh()
-        flexible = [name for name, member in self.scene.members.items() if member.type == "flexible"]
-        answer, error, difference, rough = self._found(mesh), np.inf, np.inf, None
-        mesh, found = answer[0].model.mesh, answer[1]
+        answer, rough = self._smooth(self._mesh())
+        error, difference = np.inf, np.inf
         for _ in range(HALVINGS):
-            marks = {name: np.full(len(cuts) - 1, name not in fixed) for name, cuts in mesh.cuts.items()}
-            if self.kept is not None:
-                marks = {name: marks[name] & ~resting for name, resting in self.kept.resting(mesh).items()}
-            # Where all is prescribed the error is that beside a mesh which only estimates it.
-            prescribed = fixed.issuperset(flexible)
-            finer = mesh.refined(None if prescribed else marks)
-            if not flexible:
+            (motion, found), last, before = answer, difference, rough
+            mesh = motion.model.mesh
+            if not self._flexible:
                 error = 0.0
                 break
-            other = self._found(finer)
-            last, difference, coarse = difference, _difference(found, other[1]), found
+            # Where all is prescribed the error is that beside a mesh which only estimates it.
+            prescribed = self.meshing.fixed.issuperset(self._flexible)
+            finer = self._found(mesh.refined(None if prescribed else self._halved(mesh)))
+            difference, after = _difference(found, finer[1]), _roughness(*finer)
+            left = _remaining(found, finer[1], before, after, mesh.order)
             # What gets no nearer is rounding: the coarser mesh has less of it.
-            if prescribed or difference > last:
+            if prescribed or difference > last or left > error:
                 error = difference
                 break
-            rough, before = _roughness(*other), _roughness(*answer) if rough is None else rough
-            error = _remaining(found, other[1], before, rough, mesh.order)
-            mesh, found, answer = other[0].model.mesh, other[1], other
-            if error <= self.accuracy or 2 * mesh.elements > MOST_ELEMENTS:
+            answer, rough, error = finer, after, left
+            if error <= self.accuracy or 2 * finer[0].model.mesh.elements > MOST_ELEMENTS:
                 break
         if self.kept is not None and GROWN < difference < np.inf:
-            answer, error = self._of_structure(coarse, other[1], answer)
+            answer, error = self._of_structure(found, finer[1], answer)
         self.seconds["solve"] += time.perf_counter() - begin
         return self._answered(*answer, error)
+
+    def _smooth(self, mesh: Mesh) -> tuple[tuple[SmallMotion, Eigenmotions], Array]:
+        """The motions, and their roughness, on a mesh whose elements are halved where they are rough."""
+        answer = self._found(mesh)
+        rough = _roughness(*answer)
+        # One halving of all elements is to be enough.
+        enough = 2.0**mesh.order * np.sqrt(self.accuracy / ROUGH)
+        for _ in range(LEVELS):
+            model = answer[0].model
+            worst, halved = rough.max(axis=0, initial=0.0) > enough, self._halved(model.mesh)
+            marks = {name: worst[model.elements_of(name)] & chosen for name, chosen in halved.items()}
+            if not any(own.any() for own in marks.values()) or 2 * model.mesh.elements > MOST_ELEMENTS:
+                break
+            answer = self._found(model.mesh.refined(marks))
+            rough = _roughness(*answer)
+        return answer, rough
+
+    def _halved(self, mesh: Mesh) -> dict[str, Array]:
+        """Elements (elements,) of each member that are halved where all are: not those prescribed, nor what rests."""
+        still = self.meshing.fixed | mesh.rigid
+        marks = {n: np.full(len(c) - 1, n not in still) for n, c in mesh.cuts.items()}
+        if self.kept is not None:
+            marks = {name: marks[name] & ~resting for name, resting in self.kept.resting(mesh).items()}
+        return marks
 
     @staticmethod
     def _of_structure(
@@ -498,20 +520,22 @@ def _differences(coarse: Eigenmotions, fine: Eigenmotions) -> Array:
 
 
 def _roughness(motion: SmallMotion, found: Eigenmotions) -> Array:
-    """Roughness (n,) of each motion, and of the equilibrium."""
-    rest = float(roughness(motion.rest.fields).max(initial=0.0))
-    return np.array([rest + roughness_of_change(_changes(motion, shape)) for shape in found.shapes.T])
+    """Roughness (n, elements) of each motion, and of the equilibrium."""
+    rest = roughness(motion.rest.fields)
+    shapes = [roughness_of_change(_changes(motion, shape)) for shape in found.shapes.T]
+    return rest + np.array(shapes).reshape(len(shapes), len(rest))
 
 
 def _remaining(coarse: Eigenmotions, fine: Eigenmotions, before: Array, after: Array, order: int) -> float:
-    """Largest estimated relative error of the frequencies on the fine mesh, from the roughness (n,) on both; ``order``
-    is that of the elements.
+    """Largest estimated relative error of the frequencies on the fine mesh, from the roughness (n, elements) on both;
+    ``order`` is that of the elements.
     """
     if not len(after) or len(after) != len(before) or coarse.rigid != fine.rigid:
         return _difference(coarse, fine)
     differences = _differences(coarse, fine)
     # What the order of frequencies, 2 p, leaves may be too little on coarse meshes, roughness where symmetry makes it
     # vanish: the larger one counts.
+    before, after = before.max(axis=1, initial=0.0), after.max(axis=1, initial=0.0)
     left = np.maximum(np.maximum(ROUGH * after**2, remaining_by_order(differences, 2 * order)), BLURRED)
     left = np.minimum(left, differences)
     # What roughness does not explain is rounding beside stiffnesses that differ by much, which grows with the mesh.

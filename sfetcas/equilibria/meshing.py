@@ -96,6 +96,8 @@ class Meshing:
         Wall time of assembling and solving, s.
     target, pilot_mesh : Mesh
         The mesh wanted, and the one on which the first equilibrium is found.
+    named : bool
+        Whether the type of element is prescribed.
     fixed : set of str
         Members whose number of elements is prescribed.
     switch_branch : bool
@@ -124,6 +126,7 @@ class Meshing:
             names = {settings.element}
         if len(names) > 1:
             raise SceneError(f"members: found the elements {', '.join(sorted(names))}, accepted: one for all members")
+        self.named = bool(names)
         name = next(iter(names), "SFET7" if self.accuracy < FINE and not _short(scene) else "SFET5")
         order = ELEMENTS.index(name) + 1
         # A coarser turning an element for low orders: they need more elements to be near at all.

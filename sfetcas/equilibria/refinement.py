@@ -13,11 +13,11 @@ from ..description.supports import free_to_move
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.linear import blurred
-from ..mechanics.accuracy import every_other, roughness
+from ..mechanics.accuracy import roughness
 from ..mechanics.equations import State
 from ..mechanics.fields import transferred
 from ..mechanics.loading import Loading
-from ..mechanics.mesh import Mesh
+from ..mechanics.mesh import Mesh, every_other
 from ..solvers.constraints import in_words, moves_nodes
 from ..solvers.deflation import deflated
 from ..solvers.prepared import BEYOND, Prepared, Solved
@@ -218,7 +218,7 @@ class Refinement:
         """Everything was prescribed: solve there, and estimate the error from a mesh beside it."""
         mesh = self.meshes.target
         if mesh.elements > HUGE:
-            half = replace(mesh, cuts={n: every_other(c) for n, c in mesh.cuts.items()})
+            half = replace(mesh, cuts={n: every_other(self.meshes.scene, n, c) for n, c in mesh.cuts.items()})
             coarse = self.onto(half, pilot)
             now = self.onto(mesh, coarse)
             # The error falls by 4^p a halving; twice that share for not being there yet.

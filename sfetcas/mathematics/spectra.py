@@ -25,7 +25,8 @@ EIGENPAIR = 1e-11
 """Residual of an eigenpair over its eigenvalue."""
 
 SYMMETRIC = 1e-8
-"""As :data:`EIGENPAIR` for operators that are symmetric in an inner product: the eigenvalue error is its square."""
+"""As :data:`EIGENPAIR` for operators that are symmetric, or of two symmetric matrices: the eigenvalue error is its
+square."""
 
 NOTHING_TO_GAIN = 1e-14
 """Residual over the largest eigenvalue at which rounding prevents further progress."""
@@ -50,7 +51,13 @@ LEAST_BLOCK = 8
 
 
 def largest(
-    apply: Operator, size: int, wanted: int, inner: Operator | None = None, pick: Pick | None = None
+    apply: Operator,
+    size: int,
+    wanted: int,
+    inner: Operator | None = None,
+    pick: Pick | None = None,
+    *,
+    symmetric: bool = False,
 ) -> tuple[Array, Array]:
     """Eigenvalues of an operator that are largest in size, falling, and their vectors as columns.
 
@@ -67,6 +74,8 @@ def largest(
         orthonormal in it.  Left out: the operator is not symmetric, eigenvalues may be complex.
     pick : callable, optional
         Estimates of eigenvalues, falling -> indices of those that are wanted instead of the largest.
+    symmetric : bool
+        Without an inner product: whether the operator divides one symmetric matrix by another, as linear buckling does.
 
     Raises
     ------
@@ -75,7 +84,7 @@ def largest(
     """
     start = np.random.default_rng(0).standard_normal((size, min(size, max(LEAST_BLOCK, wanted))))
     space = _Space(size, inner)
-    block, limit = space.orthonormal(apply(start)), EIGENPAIR if inner is None else SYMMETRIC
+    block, limit = space.orthonormal(apply(start)), EIGENPAIR if inner is None and not symmetric else SYMMETRIC
     most = max(MOST, LEAST_BLOCKS * block.shape[1])
     course: list[float] = []
 

@@ -22,7 +22,6 @@ from .tubes import roughness as twisted
 
 __all__ = [
     "WITHIN",
-    "every_other",
     "gain",
     "gained",
     "halving",
@@ -147,21 +146,16 @@ def _highest(model: Model, nodal: Array, turned: Array) -> tuple[Array, Array]:
     return angles, np.linalg.norm(tails, axis=1) * model.scales.length / model.scene.size
 
 
-def roughness_of_change(changes: Sequence[Displacements]) -> float:
-    """The largest roughness of any element in a small change, in parts as the real and the imaginary one, over its
-    size; errors of the frequency of a mode are about its square, most a tenth to a half of it (measured).
+def roughness_of_change(changes: Sequence[Displacements]) -> Array:
+    """The roughness (elements,) of a small change, in parts as the real and the imaginary one, over its size; errors of
+    the frequency of a mode are about the square of the largest, most a tenth to a half of it (measured).
     """
-    rough, size = [np.zeros(1)], 0.0
+    rough, size = np.zeros(changes[0].model.mesh.elements), 0.0
     for change in changes:
         model, turned = change.model, change.turned
         spins = change.spins
-        rough += _highest(model, spins[model.rotations.turns], turned)
+        rough = rough + np.sum(_highest(model, spins[model.rotations.turns], turned), axis=0)
         length = model.scales.length / model.scene.size
         moved = np.abs(turned / model.element.weights[:, None]).max(initial=0.0) * length
         size = max(size, float(np.abs(spins).max(initial=0.0) + moved))
-    return sum(float(part.max(initial=0.0)) for part in rough) / (size or 1.0)
-
-
-def every_other(cuts: Array) -> Array:
-    """The ends of elements (n + 1,), as fractions of the length, of a mesh with half as many elements."""
-    return cuts if len(cuts) < 3 else np.unique(np.append(cuts[::2], cuts[-1]))
+    return np.asarray(rough / (size or 1.0))

@@ -13,6 +13,7 @@ Magnitudes are added up whatever the directions, as loads may turn.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -24,7 +25,7 @@ from ..description.tendons import Piece, Stretch, Tendon, offsets
 from ..mathematics.arrays import Array, Index, values_of
 from ..mathematics.linear import SparseSolver
 
-__all__ = ["Carried", "carried", "magnetic", "natural_turning"]
+__all__ = ["Carried", "carried", "loose_ends", "magnetic", "natural_turning"]
 
 ALLOWANCE = 4.0
 """A member of loops is taken to carry so many times the largest share of them, though no more than all loads."""
@@ -193,6 +194,41 @@ def natural_turning(scene: Scene, member: str) -> float:
     for name, runs in scene.tube_runs.items():
         spans = [(run.end - run.start) * scene.center_lines[member].length for run in runs if run.member == member]
         found += float(np.linalg.norm(values_of(scene.tubes[name].vector))) * sum(spans)
+    return found
+
+
+def loose_ends(scene: Scene) -> dict[str, tuple[bool, bool]]:
+    """Of each flexible member whether nothing bends it at its first end, and at its second.
+
+    Forces alone act there on a member that is straight unloaded: it follows them without a boundary layer.
+    """
+    flexible = [name for name, member in scene.members.items() if member.type == "flexible"]
+    if scene.contacts or scene.tendons or scene.rings:
+        return dict.fromkeys(flexible, (False, False))
+    turned = {spring.node for spring in scene.springs.values() if spring.type == "rotational"}
+    turned |= {motion.node for motion in scene.motions.values() if motion.rotation is not None}
+    turned |= {str(load.node) for load in scene.loads.values() if load.type == "moment"}
+    turned |= {str(magnet.node) for magnet in scene.magnets.values()}
+    turned |= {name for name, node in scene.nodes.items() if node.inertia is not None}
+    ending = Counter(node for member in scene.members.values() for node in member.nodes)
+    free = {"ball", "slot", "hinge"} if scene.resolved_dimension == "plane" else {"ball", "slot"}
+    # What bends a member all along ends at its ends; what is off its line bends it by forces.
+    bent = {str(load.member) for load in scene.loads.values() if load.type == "moment"}
+    bent |= {magnet.member for magnet in scene.magnets.values() if magnet.member is not None}
+    bent |= {actuation.member for actuation in scene.actuations.values()}
+    bent |= {run.member for runs in scene.tube_runs.values() for run in runs}
+
+    def loose(node: str, release: str) -> bool:
+        record = scene.nodes[node]
+        released = release in free or record.joint in free
+        return node not in turned and (released or (ending[node] == 1 and record.turn in {"free", *free}))
+
+    found = {}
+    for name in flexible:
+        member = scene.members[name]
+        along = name in bent or scene.center_lines[name].turning > 0.0 or member.off_line(scene.sections)
+        first, second = (not along and loose(*end) for end in zip(member.nodes, member.release, strict=True))
+        found[name] = first, second
     return found
 
 

@@ -6,6 +6,7 @@ import bisect
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -21,7 +22,7 @@ from ..description.tendons import kinks_along
 from ..description.tubes import tube_breaks
 from ..mathematics import interpolation
 from ..mathematics.arrays import Array, first_of_largest
-from .carried import carried, magnetic, natural_turning
+from .carried import carried, loose_ends, magnetic, natural_turning
 
 __all__ = [
     "YIELDING",
@@ -34,6 +35,7 @@ __all__ = [
     "Vector",
     "breaks_of",
     "cut",
+    "every_other",
     "first_mesh",
     "uniform_mesh",
 ]
@@ -442,6 +444,13 @@ def breaks_of(scene: Scene, member: str) -> Array:
     return np.array([*keep, 1.0])
 
 
+def every_other(scene: Scene, member: str, cuts: Array) -> Array:
+    """The ends of elements (n,) of a mesh with half as many on a member, where elements need not end."""
+    kept = np.abs(cuts[:, None] - breaks_of(scene, member)).min(axis=1) < tolerances.DECIMAL
+    kept[::2] = True
+    return cuts[kept]
+
+
 def _divided(breaks: Array, elements: int) -> Array:
     """About ``elements`` equal elements with a cut at each break, at least one a stretch."""
     lengths = np.diff(breaks)
@@ -497,11 +506,12 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
 
     No element is expected to turn by more than ``turning`` rad by its unloaded shape, prescribed rotations and end
     moments.  Under forces far above EI/L^2 a member is straight but for boundary layers as thin as
-    ``sqrt(EI / force)`` at its ends and at loads; towards these the elements are halved again and again.
+    ``sqrt(EI / force)`` at loads and at its ends, unless nothing bends it there; towards these the elements are halved
+    again and again.
     """
     check_scene(scene, "first_mesh({}, ...)")
     rotations = [np.linalg.norm(m.rotation) for m in scene.motions.values() if m.rotation is not None]
-    reaching, follows = carried(scene), any(load.follows for load in scene.loads.values())
+    reaching, loose, follows = carried(scene), loose_ends(scene), any(load.follows for load in scene.loads.values())
     cuts, middle = {}, np.linspace(0.0, 1.0, 5)
     bent = {str(member.section) for member in scene.members.values() if member.type == "flexible"}
     soft = {name: float(np.nanmin(scene.sections[name].stiffness(middle))) for name in bent}
@@ -519,7 +529,7 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
         count = int(min(max(2.0, np.ceil((expected + waves) / turning)), 2000.0))
         layer = np.sqrt(softest / most) / line.length if most > 0.0 else np.inf
         breaks = breaks_of(scene, name)
-        cuts[name] = _graded(_divided(breaks, count), breaks, layer)
+        cuts[name] = _graded(_divided(breaks, count), breaks, layer, loose[name])
         edges = [x for formula in _formulas(scene, name) for x in formula.edges(line.length)]
         beside = np.array([np.abs(cuts[name] - x).min() for x in edges])
         cuts[name] = np.unique([*cuts[name], *np.array(edges)[beside > NEXT]])
@@ -540,13 +550,14 @@ def _formulas(scene: Scene, member: str) -> list[Formula]:
     return [one for one in (*loads, *(section.varying if section else ())) if isinstance(one, Formula)]
 
 
-def _graded(cuts: Array, breaks: Array, layer: float) -> Array:
-    """The cuts, and further ones at twice, four times, ... the layer from each break."""
-    places = [cuts]
-    for left, right in zip(breaks, breaks[1:], strict=False):
+def _graded(cuts: Array, breaks: Array, layer: float, loose: tuple[bool, bool]) -> Array:
+    """The cuts, and further ones at twice, four times, ... the layer from each break but the ends that are loose."""
+    places, last = [cuts], len(breaks) - 2
+    for i, (left, right) in enumerate(pairwise(breaks)):
         steps = int(np.floor(np.log2(max(0.25 * (right - left) / layer, 0.5)))) + 1
         distances = np.maximum(layer, 1e-13) * 2.0 ** np.arange(min(steps, 40))
-        places += [left + distances, right - distances]
+        places += [] if i == 0 and loose[0] else [left + distances]
+        places += [] if i == last and loose[1] else [right - distances]
     merged = np.unique(np.concatenate(places))
     # Cuts that nearly meet others would make slivers; breaks stay, and elements that turning needs shorter than layers.
     least = 0.3 * min(layer, float(np.median(np.diff(cuts)))) if np.isfinite(layer) else tolerances.DECIMAL

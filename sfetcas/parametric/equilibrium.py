@@ -21,12 +21,11 @@ from ..equilibria.stops import solve_stopped
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.kernels import Direct
-from ..mechanics.accuracy import every_other
 from ..mechanics.contact_points import undeformed_vectors
 from ..mechanics.equations import State
 from ..mechanics.fields import transferred
 from ..mechanics.inputs import Inputs
-from ..mechanics.mesh import Mesh
+from ..mechanics.mesh import Mesh, every_other
 from ..mechanics.model import Model, assemble
 from ..solvers.globalised import MEANINGS, NOT_DEFINED, Code, Globalised, Outcome, Rules
 from ..solvers.prepared import Prepared, Solved
@@ -449,7 +448,7 @@ def asked_mesh(scene: Scene, settings: Settings, *, lines: bool = False) -> tupl
     if not any(asked) and halved <= (settings.accuracy or scene.analysis.accuracy):
         # Half the elements are as near as was asked for.
         flexible = [n for n, member in scene.members.items() if member.type == "flexible"]
-        mesh = replace(mesh, cuts={n: every_other(c) if n in flexible else c for n, c in mesh.cuts.items()})
+        mesh = replace(mesh, cuts={n: every_other(scene, n, c) if n in flexible else c for n, c in mesh.cuts.items()})
     return mesh, model.assembly, solution.last
 
 

@@ -21,7 +21,6 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from .. import tolerances
-from ..description.scene import Scene
 from ..dynamics.modes import HALVINGS, MOST_ELEMENTS, ORDER, carried, prepared_for_motion
 from ..dynamics.small_motion import SmallMotion
 from ..equilibria.settings import Settings
@@ -29,7 +28,7 @@ from ..equilibria.single import finished
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.fields import transferred
-from ..mechanics.mesh import Mesh, breaks_of
+from ..mechanics.mesh import Mesh, every_other
 from ..mechanics.model import Model
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.between_states import turned_between
@@ -79,7 +78,7 @@ def with_modes(path: Path, settings: Settings) -> Path:
     mesh = replace(path.model.mesh, places=True)
     if not named:
         # Of higher order than that of the path: half the elements are enough to begin with.
-        cuts = {n: c if n in fixed or n not in flexible else _halves(scene, n, c) for n, c in mesh.cuts.items()}
+        cuts = {n: c if n in fixed or n not in flexible else every_other(scene, n, c) for n, c in mesh.cuts.items()}
         mesh = replace(mesh, order=max(ORDER, mesh.order), cuts=cuts)
     level, error = _Level(path, prepared_for_motion(scene, mesh)), np.inf
     for _ in range(HALVINGS if flexible else 0):
@@ -112,13 +111,6 @@ def shaken(path: Path, branch: Branch) -> Branch:
     """A branch with modes at its points, on the mesh for the modes of its path."""
     assert path.massive is not None
     return _Level(replace(path, branches=(branch,)), path.massive).answered(0, None)
-
-
-def _halves(scene: Scene, member: str, cuts: Array) -> Array:
-    """Every other cut, and those where something has to be."""
-    kept = np.abs(cuts[:, None] - np.array(breaks_of(scene, member))).min(axis=1) < tolerances.DECIMAL
-    kept[::2] = True
-    return cuts[kept]
 
 
 def _halved(mesh: Mesh, fixed: set[str]) -> Mesh:
