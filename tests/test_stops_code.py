@@ -1,4 +1,4 @@
-"""Generated C of scenes with stops and strings: the same are taut and at a stop, or a status says that they are not."""
+"""Generated C of scenes with stops and strings: for all values it finds which of them are taut and at a stop."""
 
 import importlib
 import itertools
@@ -11,12 +11,10 @@ from test_codegen import needs_compiler
 from test_contact_code import codes_of_both
 from test_stops import STOP, lever
 
-from sfetcas import SceneError, SolveError, export, load, solve
+from sfetcas import Scene, SceneError, SolveError, export, load, solve
 from sfetcas.mechanics.margins import margins
 from sfetcas.parametric.equilibrium import equilibrium_solver
-from sfetcas.parametric.watching import BEYOND
 from sfetcas.solvers.globalised import Code
-from sfetcas.solvers.prepared import Prepared, Solved
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 
@@ -61,45 +59,81 @@ SCENES = {
 }
 
 
+def changed(scene, number, value):
+    return scene.replace({"analysis.steps": [value]} if number == "factor" else {number: value})
+
+
 @pytest.mark.parametrize("name", SCENES)
-def test_status_says_whether_the_same_acts(name):
-    """Of two loads each solver made for one knows the other one if in statics the same acts."""
+def test_what_acts_is_that_of_statics(name):
+    """Each solver, made for one load, finds for all others what acts in statics."""
     scene, number, values = SCENES[name]()
-    answers, solvers = {}, {}
-    for value in values:
-        there = scene.replace({"analysis.steps": [value]} if number == "factor" else {number: value})
-        answers[value] = solve(there).last
-        solvers[value] = solver_of(there, arguments=[number])
-    acting = {value: answer.model.mesh.stops for value, answer in answers.items()}
-    assert len(set(acting.values())) > 1
-    for here, there in itertools.product(values, values):
-        outcome, results = solvers[here].solve(np.array([there]))
-        same = acting[here] == acting[there]
-        assert outcome.code is (Code.SOLVED if same else Code.TOUCHES), (here, there)
-        if same:
+    answers = {value: solve(changed(scene, number, value)).last for value in values}
+    assert len({answer.model.mesh.stops for answer in answers.values()}) > 1
+    for here in values:
+        solver = solver_of(changed(scene, number, here), arguments=[number])
+        for there, answer in answers.items():
+            outcome, results = solver.solve(np.array([there]))
+            assert outcome.code is Code.SOLVED, (here, there)
+            acting = [one.active(answer.model.mesh.stops) for one in solver.switches.constraints]
+            np.testing.assert_array_equal(solver.switches.acting(outcome.state) != 0.0, acting)
             node = "B" if "B" in scene.nodes else "load"
             # Meshes of one load may be coarser than the other one asks for.
-            found = solvers[here].by_name(results)[f"nodes.{node}.position"]
-            assert found == pytest.approx(answers[there].position(node), abs=1e-5)
-        else:
-            assert np.isnan(results).all()
+            found = solver.by_name(results)[f"nodes.{node}.position"]
+            assert found == pytest.approx(answer.position(node), abs=1e-5)
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_margins_are_those_of_statics(name):
     scene, number, values = SCENES[name]()
     for value in values:
-        solver = solver_of(
-            scene.replace({"analysis.steps": [value]} if number == "factor" else {number: value}), arguments=[number]
-        )
-        p = np.array([value])
-        outcome, _ = solver.solve(p)
-        found = np.array(solver.margins(p, outcome.state, solver.prepare(p))).ravel() + BEYOND
-        state = solver.arguments.program.equations.state(outcome.state)
-        loading = solver.model.loading(value if number == "factor" else scene.analysis.steps[-1])
-        wanted = margins(Solved.taken(Prepared(solver.model), state, loading).fields)
-        # Rounding of sums over the elements, of numbers of the size of the loads.
-        assert found == pytest.approx(list(wanted.values()), abs=1e-9 * max(1.0, abs(value)))
+        there = changed(scene, number, value)
+        solver = solver_of(there, arguments=[number])
+        state = solver.solve(np.array([value]))[0].state
+        switches, answer = solver.switches, solve(there, elements=4).last
+        acting = switches.acting(state) != 0.0
+        found = switches.signs * np.where(acting, state[switches.multipliers], -state[switches.openings])
+        wanted = [margins(answer.fields)[one] for one in switches.constraints]
+        # Differences of the meshes.
+        assert found == pytest.approx(wanted, rel=1e-5, abs=1e-6)
+        assert (found >= 0.0).all()
+        # What does not act is exactly zero.
+        assert not state[np.where(acting, switches.openings, switches.multipliers)].any()
+
+
+def test_a_warm_start_keeps_what_acts_or_switches_it():
+    scene, number, values = SCENES["stop and string"]()
+    solver = solver_of(scene, arguments=[number])
+    state = None
+    for value in [*values, *values[::-1]]:
+        warm, results = solver.solve(np.array([value]), start=state)
+        cold, wanted = solver.solve(np.array([value]))
+        assert (warm.code, cold.code) == (Code.SOLVED, Code.SOLVED)
+        # Rounding of Newton's method from another state.
+        assert results == pytest.approx(wanted, rel=1e-8, abs=1e-9)
+        state = warm.state
+
+
+def test_of_what_a_symmetry_makes_the_same_the_first_is_switched_first():
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "tendons": {
+            name: {"way": [{"node": "B"}, {"ground": [1.0, y]}], "length": 0.5}
+            for name, y in (("up", 0.5), ("down", -0.5))
+        },
+        "loads": {"f": {"type": "force", "node": "B", "value": [0, 0.0]}},
+    }
+    scene = Scene.from_dict(table)
+    solver = solver_of(scene, arguments=["loads.f.value.1", "tendons.up.length", "tendons.down.length"])
+    for force, up, down in itertools.product((-3.0, 0.0, 3.0), (0.55, 0.7), (0.55, 0.7)):
+        outcome, results = solver.solve(np.array([force, up, down]))
+        there = scene.replace({"loads.f.value.1": force, "tendons.up.length": up, "tendons.down.length": down})
+        answer = solve(there).last
+        assert outcome.code is Code.SOLVED
+        acting = [one.active(answer.model.mesh.stops) for one in solver.switches.constraints]
+        np.testing.assert_array_equal(solver.switches.acting(outcome.state) != 0.0, acting)
+        assert solver.by_name(results)["nodes.B.position"] == pytest.approx(answer.position("B"), abs=1e-6)
 
 
 def test_a_place_of_a_stop_may_be_an_argument():
@@ -110,8 +144,12 @@ def test_a_place_of_a_stop_may_be_an_argument():
         assert outcome.code is Code.SOLVED
         wanted = solve(scene.replace({"springs.k.stop": [STOP[0], high]})).last.position("B")
         assert solver.by_name(results)["nodes.B.position"] == pytest.approx(wanted, abs=1e-7)
-    # The free lever would turn by 1.06 rad.
-    assert solver.solve(np.array([1.5]))[0].code is Code.TOUCHES
+    # The free lever turns by 1.06 rad.
+    outcome, results = solver.solve(np.array([1.5]))
+    assert outcome.code is Code.SOLVED
+    free = solve(scene.replace({"springs.k.stop": [STOP[0], 1.5]})).last
+    assert not free.model.mesh.stops
+    assert solver.by_name(results)["nodes.B.position"] == pytest.approx(free.position("B"), abs=1e-6)
     # Zero is between the sides of a stop, and that of an angle is an angle.
     assert solver.solve(np.array([-0.1]))[0].code is Code.BAD_ARGUMENT
     assert [one.unit for one in solver.arguments.arguments] == ["rad"]
@@ -122,18 +160,45 @@ def test_a_number_on_which_nothing_depends_is_refused():
         solver_of(made(along()), arguments=["analysis.accuracy"])
     # That of a loose string is one on which it depends that it is loose.
     loose = solver_of(made(along()).replace({"loads.f.value.1": -0.2}), arguments=["tendons.string.length"])
-    assert [loose.solve(np.array([length]))[0].code for length in (0.6, 0.4)] == [Code.SOLVED, Code.TOUCHES]
+    tensions = []
+    for length in (0.6, 0.4):
+        outcome, results = loose.solve(np.array([length]))
+        assert outcome.code is Code.SOLVED
+        tensions.append(loose.by_name(results)["tendons.string.tension"])
+    assert tensions[0] == 0.0 < tensions[1]
 
 
 @needs_compiler
-def test_c_has_the_bits_of_the_process(tmp_path):
-    solver = export(made(along()), tmp_path / "c", arguments=["loads.f.value.1"], sensitivities=True)
-    codes = codes_of_both(solver, tmp_path / "c", [[value] for value in (1.0, 0.9, 6.0, -3.0, 0.5, np.nan)])
-    assert {Code.SOLVED, Code.TOUCHES, Code.BAD_ARGUMENT} <= set(codes)
+@pytest.mark.parametrize("name", ["stop and string", "hinge in space"])
+def test_c_has_the_bits_of_the_process(name, tmp_path):
+    scene, number, values = SCENES[name]()
+    solver = export(scene, tmp_path / "c", arguments=[number], sensitivities=True)
+    codes = codes_of_both(solver, tmp_path / "c", [[value] for value in (*values, np.nan)])
+    assert codes == [*[Code.SOLVED] * len(values), Code.BAD_ARGUMENT]
 
 
-def test_what_is_not_found_for_the_arguments_of_the_scene_is_not_written(monkeypatch, tmp_path):
-    monkeypatch.setattr(importlib.import_module("sfetcas.parametric.watching"), "BEYOND", 1.0)
-    with pytest.raises(SolveError, match=r"says for the arguments of the scene: .*: others are"):
+@needs_compiler
+def test_c_begins_anew_as_the_process_does(tmp_path):
+    """Beyond its snap the arch has no equilibrium without the string that is loose before."""
+    scene, number, _ = SCENES["arch and string"]()
+    solver = export(changed(scene, number, 3.0), tmp_path / "c", arguments=[number])
+    assert codes_of_both(solver, tmp_path / "c", [[20.0]]) == [Code.SOLVED]
+
+
+def test_derivatives_are_those_of_what_acts():
+    scene, number, values = SCENES["stop and string"]()
+    solver = solver_of(scene, arguments=[number])
+    for value in values:
+        outcome, _ = solver.solve(np.array([value]))
+        given = solver.switches.given(np.array(solver.prepare([value])).ravel(), solver.switches.acting(outcome.state))
+        found = np.array(solver.sensitivities([value], outcome.state, given)).ravel()
+        near = [solver.solve(np.array([value + step]))[1] for step in (-1e-4, 1e-4)]
+        # Central differences, of results of the size of the loads.
+        assert found == pytest.approx((near[1] - near[0]) / 2e-4, rel=1e-5, abs=1e-5)
+
+
+def test_where_no_choice_holds_nothing_is_written(monkeypatch, tmp_path):
+    monkeypatch.setattr(importlib.import_module("sfetcas.parametric.switched"), "BEYOND", -1.0)
+    with pytest.raises(SolveError, match=r"says for the arguments.*no choice of stops and strings"):
         export(made(lever([1.0])), tmp_path / "lever")
     assert not list(tmp_path.iterdir())

@@ -8,13 +8,24 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..description.records import counted
+from ..mathematics.source import table
 from ..parametric.equilibrium import EquilibriumSolver
+from ..parametric.switched import BEYOND
 from ..solvers.globalised import MEANINGS, Code
 from .core_in_c import SolverTables, core_in_c
 from .rendering import Status, Writer, defined, filled, row, rows, template
 
 __all__ = ["EquilibriumWriter"]
+
+SWITCHED = """  {
+    double acting[SF_SWITCHES];
+    sf_acting(state, acting);
+    sf_switch(m->given, acting);
+  }
+"""
+"""What derivatives begin with: what acts at the state."""
 
 SLOPES = "`{name}_sensitivities` gives the derivatives of all results by all arguments at a solution.\n\n"
 """Sentence of the README about sensitivities."""
@@ -31,7 +42,8 @@ class EquilibriumWriter(Writer):
     def __init__(self, solver: EquilibriumSolver, *, sensitivities: bool = False) -> None:
         super().__init__(solver.name, solver.scene, solver.arguments, solver.results)
         self.solver, self._sensitivities = solver, sensitivities
-        self.bodies = ("memory.c", "solver.c", *(["sensitivities.c"] if sensitivities else []))
+        switches = ["switches.c"] if solver.switches is not None else []
+        self.bodies = ("memory.c", *switches, "solver.c", *(["sensitivities.c"] if sensitivities else []))
 
     @property
     def functions(self) -> list[ca.Function]:
@@ -45,7 +57,8 @@ class EquilibriumWriter(Writer):
     @property
     def statuses(self) -> list[Status]:
         """The codes of :class:`~sfetcas.solvers.globalised.Code`."""
-        codes = [code for code in Code if code is not Code.TOUCHES or self.solver.margins is not None]
+        looked = self.solver.margins is not None or self.solver.switches is not None
+        codes = [code for code in Code if code is not Code.TOUCHES or looked]
         return [(code.name, int(code), MEANINGS[code]) for code in codes]
 
     @property
@@ -55,8 +68,10 @@ class EquilibriumWriter(Writer):
 
     @property
     def _margins(self) -> int:
-        """Number of margins that are looked at."""
-        margins = self.solver.margins
+        """Number of margins that are looked at, of contacts, or of strings and stops."""
+        margins, switches = self.solver.margins, self.solver.switches
+        if switches is not None:
+            return len(switches)
         return 0 if margins is None else int(margins.numel_out(0))
 
     @property
@@ -87,6 +102,8 @@ class EquilibriumWriter(Writer):
         started = self.solver.start is not None
         return {
             **self._sizes,
+            "find": filled(template("find.c" if self.solver.switches is None else "find_switched.c"), names),
+            "switched": SWITCHED if self.solver.switches is not None else "",
             "indent": " " * len(f"int {self.name}_solve("),
             "margins_declared": f"\n  double margins[{self._margins}];" if self._margins else "",
             "sensitivities_declared": filled(template("sensitivities.h"), names) if self._sensitivities else "",
@@ -105,8 +122,17 @@ class EquilibriumWriter(Writer):
     @property
     def tables(self) -> list[str]:
         """The core, ranges of arguments, and all that it takes of the model."""
-        constants = self._tables.constants | {"MARGINS": self._margins}
-        return [*core_in_c("afar.c"), defined(constants), *self.ranges, *self._tables.texts]
+        found = [*self.ranges, *self._tables.texts]
+        constants: dict[str, float] = {**self._tables.constants, "MARGINS": self._margins}
+        switches = self.solver.switches
+        if switches is not None:
+            numbers = {"SWITCHES": len(switches), "CHOICES": switches.most, "MARGINS": 0}
+            constants |= {**numbers, "BEYOND": BEYOND, "ALIKE": tolerances.ALIKE}
+            places = {"flag": switches.flags, "multiplier": switches.multipliers, "opening": switches.openings}
+            found += [table(f"sf_{name}_of", values, "int") for name, values in places.items()]
+            found += [table("sf_string", switches.strings, "int"), table("sf_sign_of", switches.signs)]
+            found += [table("sf_acts", switches.default)]
+        return [*core_in_c("afar.c"), defined(constants), *found]
 
     @property
     def cases(self) -> dict[str, object]:

@@ -19,9 +19,8 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..errors import SceneError, SolveError, Status
-from ..mathematics.arrays import first_of_largest
 from ..mechanics.margins import ROUNDING, margins
-from ..mechanics.unilateral import Stops, Unilateral, switched_over, unilaterals
+from ..mechanics.unilateral import Stops, Unilateral, switched_over, unilaterals, worst_of
 from .several import alike
 from .solution import Equilibrium, Solution, at_factor
 from .statics import Settings, solve
@@ -183,11 +182,8 @@ def next_stops(found: Margins, stops: Stops) -> Stops:
 
     Tendons come first: with the one that pushes most, or without the slack one that is longest beyond its free length.
     """
-    for table in ("tendons", "springs"):
-        for active in (True, False):
-            wrong = {one: -margin for one, margin in found.items() if (one.table, one.active(stops)) == (table, active)}
-            if wrong and max(wrong.values()) > ROUNDING:
-                # Of those that a symmetry makes the same the first in the scene.
-                worst = first_of_largest(np.maximum(list(wrong.values()), 0.0))
-                return switched_over(stops, [list(wrong)[worst]])
-    return stops
+    constraints = list(found)
+    active = np.array([one.active(stops) for one in constraints], dtype=bool)
+    strings = np.array([one.table == "tendons" for one in constraints], dtype=bool)
+    worst = worst_of(np.array([*found.values()]), active, strings, ROUNDING)
+    return stops if worst is None else switched_over(stops, [constraints[worst]])

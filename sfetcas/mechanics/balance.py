@@ -15,7 +15,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mathematics.keeping import kept
 from .batches import GroupBatch
-from .connections import connections_of
+from .connections import connections_of, row_of
 from .equations import Equations, State
 from .loading import Loading
 from .segments import elongation_of
@@ -191,10 +191,9 @@ class Balance:
         state = SpringState("angle" in found, *found.values())
         if record.stop is None:
             return state
-        unit, row = self.model.scales.moment if state.rotational else self.model.scales.force, f"springs.{name}.stop"
-        names = self.model.row_names
-        effort = -float(self._state.lam[names.index(row)]) * unit if row in names else 0.0
-        return replace(state, stop=effort)
+        unit, names = self.model.scales.moment if state.rotational else self.model.scales.force, self.model.row_names
+        acting = [names.index(row) for side in ("low", "high") if (row := row_of("springs", name, side)) in names]
+        return replace(state, stop=0.0 - float(self._state.lam[acting].sum()) * unit)
 
     def answers(self, table: str, name: str) -> dict[str, float]:
         """Quantities that the terms of a record (``table``, ``name``) add to the answer, by key, in SI units."""

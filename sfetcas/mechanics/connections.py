@@ -36,7 +36,12 @@ from .rotations import Pin, Rotations, end_joints
 from .segments import Segments
 from .terms import GROUND, Group, One
 
-__all__ = ["body_numbers", "connections_in", "connections_of", "freedoms", "stopped_in"]
+__all__ = ["body_numbers", "connections_in", "connections_of", "freedoms", "row_of", "stopped_in"]
+
+
+def row_of(table: str, name: str, side: str) -> str:
+    """Name of the row of a unilateral constraint: a string, or one of the stops of a spring."""
+    return f"springs.{name}, {side} stop" if table == "springs" else f"{table}.{name}"
 
 
 def connections_in(parts: Parts) -> Iterator[One]:
@@ -158,7 +163,7 @@ class _Maker:
         for name, side in mesh.stops:
             if side in ("slack", "released", "pulled"):
                 continue
-            spring, row = self.scene.springs[name], f"springs.{name}.stop"
+            spring, row = self.scene.springs[name], row_of("springs", name, side)
             assert spring.stop is not None
             at = spring.stop[0 if side == "low" else 1]
             if spring.type == "rotational":

@@ -252,6 +252,8 @@ class TurnSpring(Turning):
 class TurnStop(Turning):
     """Constraint: a rotational spring is at a stop; own data: angle of the stop, rad."""
 
+    shares_row: ClassVar[bool] = True
+
     @property
     def own(self) -> int:
         """One: the angle of the stop."""
@@ -272,6 +274,8 @@ class TurnStop(Turning):
 @dataclass(frozen=True)
 class LineStop(Term):
     """Constraint: a spring along a direction is at a stop; data: direction, displacement at the stop."""
+
+    shares_row: ClassVar[bool] = True
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:

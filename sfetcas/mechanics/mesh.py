@@ -320,6 +320,8 @@ class Mesh:
         Members whose elements are never halved.
     stops : tuple of (str, str)
         Springs that are held at a stop: name, and ``low`` or ``high``; tendons that are slack: name, and ``slack``.
+    switched : bool
+        Whether all unilateral constraints are in the model, ``stops`` among them, each with a switch in its data.
     points : tuple of ContactPoint
         Where members touch each other or obstacles, and it is an unknown where.
     places : bool
@@ -338,6 +340,7 @@ class Mesh:
     gauss: bool = False
     rigid: frozenset[str] = frozenset()
     stops: tuple[tuple[str, str], ...] = ()
+    switched: bool = False
     points: tuple[ContactPoint, ...] = ()
     places: bool = False
     spots: tuple[Spot, ...] | None = None

@@ -41,8 +41,9 @@ from .relaxation import relaxations_in
 from .rings import rings_in
 from .rotating_frame import RotatingFrame, with_rotating_frame
 from .rotations import RotationFreedom, Rotations, number_rotations
-from .segments import Segments, cut_members
+from .segments import Segments, cut_members, one_sided
 from .stretch_laws import stretch_laws_in
+from .switches import switches_in
 from .tendon_chains import rubbing_in
 from .tendon_terms import tendons_in
 from .terms import ALWAYS, Group, One, grouped
@@ -63,6 +64,7 @@ SOURCES: list[Callable[[Parts], Iterable[One]]] = [
     magnets_in,
     center_weights_in,
     tendons_in,
+    switches_in,
     rubbing_in,
     tubes_in,
     rings_in,
@@ -71,8 +73,8 @@ SOURCES: list[Callable[[Parts], Iterable[One]]] = [
 ]
 """Functions that make the terms beside the elements; a further kind of energy is one more function."""
 
-SHARED_ROWS = {"rings": "ring", "contacts": "point of contact"}
-"""What rows are called to which several terms add their shares, by the tables of these; else those of tendons."""
+SHARED_ROWS = {"rings": "ring", "contacts": "point of contact", "tendons": "length of tendon"}
+"""What rows are called to which several terms add their shares, by the tables of these; else by their kind."""
 
 KNOWS_NO_STEPS = "a model by itself knows no steps, accepted: solve(scene)"
 """What is said of scenes whose load steps come one after the other."""
@@ -403,7 +405,8 @@ def _blocks(model: Model) -> tuple[Block, ...]:
     relaxing = {model.segments.places[i] for i in model.segments.relaxing.flat if i >= 0}
     rings = len(model.scene.rings)
     points = sum(sum(point.slides) + model.element.axes for point in model.mesh.points)
-    others = angles + rings + points
+    switches = 2 * len(one_sided(model.scene)) if model.mesh.switched else 0
+    others = angles + rings + points + switches
     strains = sum(len(part) for name, part in model.segments.strained.items() if name not in relaxing) - others
     if strains:
         blocks.append(
@@ -417,6 +420,8 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         blocks.append(Block("angles of tubes", angles, "how each tube is twisted against the member at its nodes"))
     if rings:
         blocks.append(Block("places of rings", rings, "how far each ring has moved along its member"))
+    if switches:
+        blocks.append(Block("openings", switches, "how far each string and stop is from acting"))
     if points:
         why = f"where members touch at {counted(len(model.mesh.points), 'point')}, and the vectors there"
         blocks.append(Block("points of contact", points, why))
@@ -431,7 +436,7 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         blocks.append(Block("closings", len(model.positions.rows), f"{why}; the multipliers are forces"))
     for group in model.connections:
         if group.rows:
-            shared = SHARED_ROWS.get(group.kind.table, "length of tendon") if group.kind.shares_row else ""
-            name = shared or type(group.kind).__name__.lower()
+            name = SHARED_ROWS.get(group.kind.table, "") if group.kind.shares_row else ""
+            name = name or type(group.kind).__name__.lower()
             blocks.append(Block(f"{name} rows", len(group.rows), enumerated(tuple(dict.fromkeys(group.names)))))
     return tuple(blocks)

@@ -32,6 +32,7 @@ __all__ = [
     "cut_members",
     "cuts_of_point",
     "elongation_of",
+    "one_sided",
     "place_of_cut",
     "place_of_ring",
     "place_within",
@@ -39,6 +40,7 @@ __all__ = [
     "spanned",
     "standing",
     "stations_of_line",
+    "switch_of",
     "tensions_of",
     "weights_towards",
 ]
@@ -81,8 +83,8 @@ class Segments:
     relaxing : ndarray (2, branches, elements, points)
         The same of the part of the changes of curvature (0) and of the strains (1) that has relaxed in each branch.
     strained : mapping of str to mapping of int to str
-        Components that are unknown at each of these places, which are the last ones, with their names; places of rings
-        and of contact points are among them.
+        Components that are unknown at each of these places, which are the last ones, with their names; places of
+        rings, switches and contact points are among them.
     pulled : int
         Number of places before these that tell tensions and elongations of tendons.
     angles : mapping of str to ndarray (elements, nodes)
@@ -222,6 +224,20 @@ def pulled_place(scene: Scene, mesh: Mesh, tendon: str) -> str:
         return elongation_of(tendon)
     taut = record.measured and (tendon, "slack") not in mesh.stops
     return f"tension of tendons.{tendon}" if record.rubs and taut else ""
+
+
+def one_sided(scene: Scene) -> tuple[tuple[str, str, str], ...]:
+    """Table, name and side of each unilateral constraint of a scene but its obstacles: strings ``slack``, stops of
+    springs ``low`` and ``high``; tendons first, in the order of the scene.
+    """
+    strings = [("tendons", name, "slack") for name, tendon in scene.tendons.items() if tendon.may_be_slack]
+    stopped = [name for name, spring in scene.springs.items() if spring.stop is not None]
+    return (*strings, *(("springs", name, side) for name in stopped for side in ("low", "high")))
+
+
+def switch_of(table: str, name: str, side: str) -> str:
+    """Name of the place with the opening of a unilateral constraint, and of the row that switches it."""
+    return f"switch of {table}.{name}, {side}"
 
 
 def angle_of(tube: str, number: int) -> str:
@@ -386,6 +402,8 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     relaxing = _relaxing(scene, mesh, len(places), len(owner), strained)
     angles, twisted = _angles(scene, mesh, len(places) + len(strained))
     strained |= twisted | {place_of_ring(name): {0: "arc length"} for name in scene.rings}
+    for one in one_sided(scene) if mesh.switched else ():
+        strained[switch_of(*one)] = {0: "opening", 1: "idle"}
     axes = "xyz" if scene.resolved_dimension == "space" else "xy"
     for point in mesh.points:
         strained |= {point.place(side): {0: "arc length"} for side, free in enumerate(point.slides) if free}

@@ -98,6 +98,9 @@ class Term(Components, abc.ABC):
     is_couple: ClassVar[bool] = False
     """Whether it is a dead moment."""
 
+    switches: ClassVar[bool] = False
+    """Whether its one number of data says whether a unilateral constraint is active."""
+
     drives: ClassVar[str] = ""
     """What is prescribed by its ``load``: ``angle`` or ``travel`` of a joint, ``twist`` of a tube; else empty."""
 

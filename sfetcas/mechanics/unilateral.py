@@ -14,11 +14,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..description.scene import Scene
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import Array, Index, first_of_largest
+from .connections import row_of
 from .mesh import Approach, Mesh, Spot
 from .model import Model
+from .segments import one_sided
 
-__all__ = ["NONE", "Stops", "Unilateral", "UnilateralRows", "all_stops", "rows_of", "switched_over", "unilaterals"]
+__all__ = [
+    "NONE",
+    "Stops",
+    "Unilateral",
+    "UnilateralRows",
+    "all_stops",
+    "rows_of",
+    "switched_over",
+    "unilaterals",
+    "worst_of",
+]
 
 Stops = tuple[tuple[str, str], ...]
 """A choice: springs at a stop: name, and low or high; tendons slack or let out: name, and slack or released."""
@@ -47,6 +59,16 @@ class Unilateral:
     def where(self) -> str:
         """Where it stands in the scene."""
         return f"{self.table}.{self.name}"
+
+    @property
+    def row(self) -> str:
+        """Name of its row where it is active."""
+        return row_of(self.table, self.name, self.side)
+
+    @property
+    def sign(self) -> float:
+        """Times its multiplier its margin while it is active; times its gap minus that while it is not."""
+        return -1.0 if self.side in ("low", "touching") else 1.0
 
     @property
     def entry(self) -> tuple[str, str]:
@@ -79,9 +101,29 @@ class Unilateral:
 
 def unilaterals(scene: Scene) -> tuple[Unilateral, ...]:
     """The unilateral constraints of a scene but its obstacles: tendons first, in its order."""
-    strings = [Unilateral("tendons", name, "slack") for name, tendon in scene.tendons.items() if tendon.may_be_slack]
-    stopped = [name for name, spring in scene.springs.items() if spring.stop is not None]
-    return (*strings, *(Unilateral("springs", name, side) for name in stopped for side in ("low", "high")))
+    return tuple(Unilateral(*one) for one in one_sided(scene))
+
+
+def worst_of(margins: Array, active: Array, strings: Array, least: float) -> int | None:
+    """Number of the constraint to switch next; None where no margin (n,) is below zero by more than ``least``.
+
+    Strings come before stops: of those that push the one that pushes most, else of those that are longer than they can
+    be the longest; of what a symmetry makes the same the first.
+
+    Parameters
+    ----------
+    margins : ndarray (n,)
+        Dimensionless.
+    active, strings : ndarray (n,) of bool
+        Which are active, and which are strings.
+    least : float
+    """
+    for table in (True, False):
+        for acting in (True, False):
+            wrong = np.where((strings == table) & (active == acting), np.maximum(-margins, 0.0), 0.0)
+            if wrong.max(initial=0.0) > least:
+                return first_of_largest(wrong)
+    return None
 
 
 def switched_over(stops: Stops, which: Iterable[Unilateral]) -> Stops:
@@ -159,10 +201,6 @@ def rows_of(model: Model) -> UnilateralRows:
         if part.spot is not None:
             found.append(number[part.spot.name])
             restitution[i] = scene.contacts[part.name].restitution
-        elif part.table == "tendons":
-            found.append(names.index(f"tendons.{part.name}"))
         else:
-            both = [k for k, row in enumerate(names) if row == f"springs.{part.name}.stop"]
-            found.append(both[part.side == "high"])
-    signs = [-1.0 if part.side in ("low", "touching") else 1.0 for part in parts]
-    return UnilateralRows(parts, np.array(found, dtype=np.intp), np.array(signs), restitution)
+            found.append(names.index(part.row))
+    return UnilateralRows(parts, np.array(found, dtype=np.intp), np.array([part.sign for part in parts]), restitution)

@@ -773,6 +773,7 @@ class Arguments:
         changed = np.any([[part.any() for part in group] for group in loads], axis=0)
         acting = np.any([[part.any() for part in group] for group in self._split(self._given.values, cut)[1]], axis=0)
         flags |= {n: bool(a or b) for n, a, b in zip(names[len(data) :], changed, acting, strict=True)}
+        flags |= {f"data_{i}": True for i, group in enumerate(self.model.connections) if group.kind.switches}
         return flags
 
     def undeformed(self, p: ca.MX) -> ca.MX:

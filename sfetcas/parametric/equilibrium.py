@@ -27,10 +27,12 @@ from ..mechanics.fields import transferred
 from ..mechanics.inputs import Inputs
 from ..mechanics.mesh import Mesh, every_other
 from ..mechanics.model import Model, assemble
+from ..mechanics.unilateral import all_stops
 from ..solvers.globalised import MEANINGS, NOT_DEFINED, Code, Globalised, Outcome, Rules
 from ..solvers.prepared import Prepared, Solved
 from .arguments import Arguments, Asked, asked_for, in_words
 from .results import Results, default_results
+from .switched import Switches
 from .watching import watched_of
 
 __all__ = [
@@ -75,7 +77,9 @@ class EquilibriumSolver:
     answer : Equilibrium
         The static answer for the last step of the scene on a finer mesh, by which the accuracy was checked.
     margins : Function or None
-        Of a scene with contacts or stops what is looked at, see :func:`~sfetcas.parametric.watching.watched_of`.
+        Of a scene with contacts what is looked at, see :func:`~sfetcas.parametric.watching.watched_of`.
+    switches : Switches or None
+        Of a scene with stops or strings that may be slack, where it is found which of them act.
     begun : ndarray (numbers,) or None
         Where something touches the arguments of which ``start`` is the equilibrium.
     """
@@ -88,6 +92,7 @@ class EquilibriumSolver:
     start: Array | None
     answer: Equilibrium
     margins: ca.Function | None = None
+    switches: Switches | None = None
     begun: Array | None = None
 
     def __repr__(self) -> str:
@@ -207,6 +212,8 @@ class EquilibriumSolver:
             return outcome, nothing
         p, state = np.append(p, outcome.places), outcome.state
         given = self._called(self.prepare, p)
+        if self.switches is not None:
+            given = self.switches.given(given, self.switches.acting(state))
         # A stiffness of what is singular is not a number either.
         outputs = self._called(self.output, p, state, given)
         if not np.isfinite(outputs).all():
@@ -227,19 +234,45 @@ class EquilibriumSolver:
         return {}
 
     def found(self, arguments: Array, start: Array | None = None, places: Array | None = None) -> Outcome:
-        """The equilibrium for arguments (numbers,), on elements that end where lines do.
+        """The equilibrium for arguments (numbers,), on elements that end where lines do, with what acts of strings and
+        stops.
 
         Parameters
         ----------
         start : (states,), state to begin with, for a warm start
         places : (ends,), where elements end then
         """
+        if self.switches is None:
+            return self._fitted(arguments, start, places)
+        acting = self.switches.default if start is None else self.switches.acting(start)
+        iterations, others = 0, [*self.switches.beginnings]
+        for _ in range(self.switches.most):
+            outcome = self._fitted(arguments, start, places, acting)
+            iterations += outcome.iterations
+            outcome = replace(outcome, iterations=iterations)
+            if outcome.code not in SOLVED:
+                if not others or outcome.code is Code.BAD_ARGUMENT:
+                    return outcome
+                acting, start = others.pop(0), None
+                continue
+            there = self.switches.switched(outcome.state, acting)
+            if there is None:
+                return replace(outcome, state=self.switches.exact(outcome.state, acting))
+            acting, start = there, outcome.state
+        return replace(outcome, code=Code.TOUCHES, negative=NOT_DEFINED)
+
+    def _fitted(
+        self, arguments: Array, start: Array | None, places: Array | None, acting: Array | None = None
+    ) -> Outcome:
+        """The same with what acts (constraints,) as it is given."""
         known, iterations = self.arguments, 0
         state, ends = self.start if start is None else start, known.places if places is None else places
         warm, good = start is not None, known.accepted(arguments)
         for _ in range(FITS):
             p = np.append(arguments, ends)
             given = self._called(self.prepare, p)
+            if self.switches is not None and acting is not None:
+                given = self.switches.given(given, acting)
             row = self._called(known.program.row, given)
             outcome = self.method(row if good else row * np.nan, state, warm=warm)
             iterations += outcome.iterations
@@ -306,7 +339,7 @@ def equilibrium_solver(
     settings : as of :func:`~sfetcas.equilibria.statics.solve`
     stopped : whether it is for what is taut and at a stop in the answer of statics only; else such scenes are refused
     touching : whether it is for what touches in the answer of statics only; else such scenes are refused
-    watched : whether a solve then looks whether the same touches
+    watched : whether a solve then looks whether the same touches, and finds what is taut and at a stop
 
     Raises
     ------
@@ -321,6 +354,8 @@ def equilibrium_solver(
         message = "found 'modes', accepted: static or path, whose equilibria are exported, or dynamic"
         raise SceneError(message, ("analysis", "type"))
     mesh, assembly, answer = asked_mesh(scene, settings or Settings(), lines=not watched)
+    switched, acting = watched and scene.stopped, mesh.stops
+    mesh = replace(mesh, stops=all_stops(scene), switched=True) if switched else mesh
     base = assemble(scene, mesh, assembly=assembly)
     prepared = Prepared(base)
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
@@ -331,21 +366,22 @@ def equilibrium_solver(
         names = [name for name in names if not name.startswith("members.")]
     outputs = Results(base, names, chosen_places(members, places or {}), unique=unique)
     outputs.refuse_places()
-    known = Arguments(scene, base, asked_for(scene, arguments), outputs, f"{name}_", needed=not stopped)
+    known = Arguments(scene, base, asked_for(scene, arguments), outputs, f"{name}_", needed=switched or not stopped)
     start = None
     if prepared.lacks_slack or any(node.start is not None for node in scene.nodes.values()):
         # Straight members without slack bend to no side by themselves; a start chooses one.
         start = prepared.guess(base.loading(scene.analysis.steps[-1]))[0].flat
     rules = Rules() if scene.analysis.unstable == "leave" else replace(Rules(), escapes=0)
-    margins = watched_of(f"{name}_margins", base, known) if watched else None
-    solver = EquilibriumSolver(name, scene, known, outputs, rules, start, answer, margins)
+    margins = watched_of(f"{name}_margins", base, known) if watched and scene.contacts else None
+    switches = Switches.of(known.program, acting) if switched else None
+    solver = EquilibriumSolver(name, scene, known, outputs, rules, start, answer, margins, switches)
     if mesh.points:
         # What touches does so near its answer alone.
         begun = in_contact(kept_of(scene, settings or Settings(), solved_from(answer)), solver.model)
         solver = replace(solver, start=begun.flat, begun=known.defaults)
         return _found(solver) if watched else solver
     solver = solver if start is not None or _same(solver) else replace(solver, start=_answered(solver))
-    return _found(solver) if watched and scene.stopped else solver
+    return _found(solver) if switched else solver
 
 
 def _found(solver: EquilibriumSolver) -> EquilibriumSolver:

@@ -1,4 +1,4 @@
-"""What is looked at where what touches, or is taut or at a stop, is not found anew, as in generated code.
+"""What is looked at beside an equilibrium with what touches, or is taut or at a stop, as it was.
 
 Of stops and of strings that may be slack these are tensions, reactions of stops, and gaps, which are the residuals of
 their rows in a model in which they are active.
@@ -25,7 +25,7 @@ from ..mathematics.arrays import Array, Index
 from ..mechanics.fields import numbers_like
 from ..mechanics.model import Model, assemble
 from ..mechanics.singles import turned_vector
-from ..mechanics.unilateral import Unilateral, unilaterals
+from ..mechanics.unilateral import unilaterals
 from .arguments import Argument, Arguments, refuse_idle
 from .results import Outputs, Results
 
@@ -43,33 +43,22 @@ BESIDE = 3.0
 FAR = 1.0
 """The margin of what is not looked at; that of what does not hold at all is as far below zero."""
 
-BEYOND = -1e-9
-"""Margin of a stop or a string from which on another choice holds: more than rounding leaves of what is zero."""
-
 NO_PUSH = 1e-12
 """A push, dimensionless, that is none: without one a place may be anywhere on a surface that its member crosses."""
 
 
-def watched_of(name: str, base: Model, known: Arguments) -> ca.Function | None:
-    """``(arguments, state, given) ->`` margins (n,) of all that may touch, be at a stop, or be slack, each with what it
-    may be below zero by added: another choice holds where one is below zero.  None where there is nothing of this kind.
+def watched_of(name: str, base: Model, known: Arguments) -> ca.Function:
+    """``(arguments, state, given) ->`` margins (n,) of all that may touch, each with what it may be below zero by
+    added: something else touches where one is below zero.
 
     Raises
     ------
     SceneError
-        Contacts whose margins are not known; a number on which nothing depends.
+        Contacts whose margins are not known.
     """
-    scene = base.scene
-    if scene.contacts:
-        margins, least = _contact_margins(name, base, known.arguments), LEAST
-    elif scene.stopped:
-        gauges = gauges_of(base, known.arguments)
-        refuse_idle_in_all(known, gauges)
-        margins, least = stop_margins_of(name, base, known, gauges), BEYOND
-    else:
-        return None
+    margins = _contact_margins(name, base, known.arguments)
     inputs = margins.mx_in()
-    return ca.Function(name, inputs, [margins(*inputs) - least], margins.name_in(), margins.name_out())
+    return ca.Function(name, inputs, [margins(*inputs) - LEAST], margins.name_in(), margins.name_out())
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,10 +136,10 @@ def stop_margins_of(name: str, base: Model, known: Arguments, gauges: Mapping[st
     for one in unilaterals(base.scene):
         low = one.side == "low"
         if one.active(stops):
-            value = -lam[base.row_names.index(_row(one))]
+            value = -lam[base.row_names.index(one.row)]
         else:
             side = "low" if low else tuple(gauges)[-1]
-            value = gaps[side][gauges[side].model.row_names.index(_row(one))]
+            value = gaps[side][gauges[side].model.row_names.index(one.row)]
         found.append(value if low else -value)
     margins = ca.vertcat(*found)
     return ca.Function(name, [p, state, program.symbol], [margins], ["arguments", "state", "given"], ["margins"])
@@ -161,11 +150,6 @@ def _chosen(values: ca.MX, numbers: Index) -> ca.MX:
     if not len(numbers):
         return ca.MX(0, 1)
     return ca.vertcat(values, 0.0)[np.where(numbers < 0, values.numel(), numbers).tolist()]
-
-
-def _row(one: Unilateral) -> str:
-    """Name of the row of a constraint where it is active."""
-    return f"{one.table}.{one.name}" + (".stop" if one.table == "springs" else "")
 
 
 def _contact_margins(name: str, base: Model, arguments: Sequence[Argument]) -> ca.Function:

@@ -67,13 +67,9 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
   sought.residual = HUGE_VAL;
   if (results) sf_none(results, @NAME@_RESULTS);
   sf_call(m, @name@_prepare, arguments, 0, 0, m->given);
-  sf_call(m, @name@_row, m->given, 0, 0, row);
   if (begins) sf_copy(own, warm ? state : sf_start, SF_STATE);
   if (sf_accepted(arguments)) {
-    status = @NAME@_STALLED;
-    if (!sf_find(&model, &system, &sf_the_rules, &inputs, row, begins, own, &point, numbers, &sought))
-      status = sought.status;
-  }
+@find@  }
   if (results && status <= @NAME@_UNSTABLE &&
       (sf_call(m, @name@_results, arguments, own, m->given, results) || !sf_all_finite(results, @NAME@_RESULTS))) {
     /* A result beyond what numbers can say, or a stiffness of what is singular. */
