@@ -263,7 +263,6 @@ ORDER = [
     "parametric.switched",
     "parametric.equilibrium",
     "parametric.implicit",
-    "parametric.choosing",
     "parametric.touching",
     "parametric.plain",
     "parametric.solving",

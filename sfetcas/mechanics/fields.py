@@ -45,7 +45,7 @@ from .terms import answers_of, energies_of
 from .tube_fields import fields_of_tube, places_along
 from .tubes import angles_like, moments_of
 
-__all__ = ["Fields", "numbers_like", "rotations_along", "strained_like", "transferred"]
+__all__ = ["Fields", "rotations_along", "strained_like", "transferred"]
 
 LARGE = 1.0
 """Displacement over size, or rotation in rad, of a small member at which its results are refused as meaningless."""
@@ -1111,18 +1111,6 @@ def transferred(source: Any, state: State, target: Any) -> State:
     relax(target, q, y)
     lam = _by_name(source.row_names, state.lam, target.row_names)
     return State(q, y, lam, _counted(source, state, target))
-
-
-def numbers_like(source: Any, target: Any) -> tuple[Index, Index]:
-    """Of two models of the same scene and mesh: the numbers of the displacement unknowns of the second, and of its
-    angles that count turns, among those of the first; -1 for what is new.
-    """
-    names, angles = source.positions.unknowns, source.unwrapping.names
-    coded = np.arange(1.0, 1.0 + len(names)), np.arange(1.0, 1.0 + len(angles))
-    nothing = np.zeros(0)
-    y = _by_name(names, coded[0], target.positions.unknowns)
-    counted = _counted(source, State(nothing, nothing, nothing, coded[1]), target)
-    return y.astype(np.intp) - 1, counted.astype(np.intp) - 1
 
 
 def _counted(source: Any, state: State, target: Any) -> Array:

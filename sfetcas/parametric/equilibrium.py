@@ -337,9 +337,9 @@ def equilibrium_solver(
     results : names of results; by default those of :func:`~sfetcas.parametric.results.default_results`
     places : fractions of the length at which results along members are given
     settings : as of :func:`~sfetcas.equilibria.statics.solve`
-    stopped : whether it is for what is taut and at a stop in the answer of statics only; else such scenes are refused
+    stopped : whether it may find what is taut and at a stop; else such scenes are refused
     touching : whether it is for what touches in the answer of statics only; else such scenes are refused
-    watched : whether a solve then looks whether the same touches, and finds what is taut and at a stop
+    watched : whether a solve then looks whether the same touches
 
     Raises
     ------
@@ -354,8 +354,8 @@ def equilibrium_solver(
         message = "found 'modes', accepted: static or path, whose equilibria are exported, or dynamic"
         raise SceneError(message, ("analysis", "type"))
     mesh, assembly, answer = asked_mesh(scene, settings or Settings(), lines=not watched)
-    switched, acting = watched and scene.stopped, mesh.stops
-    mesh = replace(mesh, stops=all_stops(scene), switched=True) if switched else mesh
+    acting = mesh.stops
+    mesh = replace(mesh, stops=all_stops(scene), switched=True) if scene.stopped else mesh
     base = assemble(scene, mesh, assembly=assembly)
     prepared = Prepared(base)
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
@@ -366,14 +366,14 @@ def equilibrium_solver(
         names = [name for name in names if not name.startswith("members.")]
     outputs = Results(base, names, chosen_places(members, places or {}), unique=unique)
     outputs.refuse_places()
-    known = Arguments(scene, base, asked_for(scene, arguments), outputs, f"{name}_", needed=switched or not stopped)
+    known = Arguments(scene, base, asked_for(scene, arguments), outputs, f"{name}_")
     start = None
     if prepared.lacks_slack or any(node.start is not None for node in scene.nodes.values()):
         # Straight members without slack bend to no side by themselves; a start chooses one.
         start = prepared.guess(base.loading(scene.analysis.steps[-1]))[0].flat
     rules = Rules() if scene.analysis.unstable == "leave" else replace(Rules(), escapes=0)
     margins = watched_of(f"{name}_margins", base, known) if watched and scene.contacts else None
-    switches = Switches.of(known.program, acting) if switched else None
+    switches = Switches.of(known.program, acting) if scene.stopped else None
     solver = EquilibriumSolver(name, scene, known, outputs, rules, start, answer, margins, switches)
     if mesh.points:
         # What touches does so near its answer alone.
@@ -381,7 +381,7 @@ def equilibrium_solver(
         solver = replace(solver, start=begun.flat, begun=known.defaults)
         return _found(solver) if watched else solver
     solver = solver if start is not None or _same(solver) else replace(solver, start=_answered(solver))
-    return _found(solver) if switched else solver
+    return _found(solver) if watched and scene.stopped else solver
 
 
 def _found(solver: EquilibriumSolver) -> EquilibriumSolver:

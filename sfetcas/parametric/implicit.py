@@ -35,6 +35,7 @@ from ..mathematics.linear import SparseSolver, places_of
 from ..mathematics.threads import single_threaded
 from .arguments import Arguments
 from .results import Results
+from .switched import Switches
 
 __all__ = ["Implicit", "Slopes"]
 
@@ -97,6 +98,8 @@ class Implicit:
         Weights of the unknowns, by which eigenvalues are of order one; zero for multipliers.
     unique : bool
         Whether constraints are independent of each other.
+    switches : Switches, optional
+        Strings and stops, of which act what does so at the equilibrium.
 
     Attributes
     ----------
@@ -104,8 +107,17 @@ class Implicit:
         Number of unknowns and multipliers; number of rotation unknowns, which come first.
     """
 
-    def __init__(self, arguments: Arguments, results: Results, weight: Array, *, unique: bool = True) -> None:
+    def __init__(
+        self,
+        arguments: Arguments,
+        results: Results,
+        weight: Array,
+        *,
+        unique: bool = True,
+        switches: Switches | None = None,
+    ) -> None:
         self._arguments, self._results, self._program = arguments, results, arguments.program
+        self._switches = switches
         self._weight, self._unique = weight, unique
         self.total, self._count = arguments.expressions.total, arguments.size
         self.rotation_unknowns = self._program.equations.rotation_unknowns
@@ -125,6 +137,8 @@ class Implicit:
         program, (x, state) = self._program, self._symbols
         step, data = ca.vertsplit(x, [0, self.total, self.total + self._data.size])
         given, rest = self._data.whole(data)
+        if self._switches is not None:
+            given = self._switches.expression(given, state)
         hold = ca.Function("hold", [program.state_symbol, program.symbol], [program.prescribed_expression])
         there = hold.call([state, given], True)[0]
         if moved:

@@ -17,7 +17,7 @@ from ..description.showing import shown, stability_in_words, values_in_words
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
 from ..equilibria.statics import solve
-from ..equilibria.stops import settled, solve_stopped
+from ..equilibria.stops import solve_stopped
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
@@ -25,13 +25,11 @@ from ..mechanics.expressions import Expressions
 from ..mechanics.fields import transferred
 from ..mechanics.inputs import Inputs
 from ..mechanics.model import assemble
-from ..mechanics.unilateral import Stops, Unilateral
 from ..processes import cores
 from ..solvers.globalised import MEANINGS, NOT_DEFINED, Code, Globalised, Outcome
 from ..solvers.prepared import Prepared
 from ..solvers.program import Program
 from .arguments import Argument, Asked, in_words
-from .choosing import Choosing
 from .equilibrium import SOLVED, EquilibriumSolver, Place, equilibrium_solver, refuse_search
 from .implicit import Implicit, Slopes
 from .plain import PlainCases, plain_cases
@@ -95,17 +93,13 @@ def parametric(
             stopped=scene.stopped,
             touching=bool(scene.contacts),
         )
-        choosing = Choosing(solver) if scene.stopped else None
-        if choosing is not None:
-            choosing.check()
     except SceneError as error:
         raise _renamed(error) from None
     if not answers:
         own = [one.name for one in solver.results.results if not one.member]
         solver = solver.with_results(own)
-        choosing = None if choosing is None else replace(choosing, first=solver)
     touching = Touching(solver, settings or Settings()) if scene.contacts else None
-    return ParametricEquilibrium(solver, settings or Settings(), choosing, touching)
+    return ParametricEquilibrium(solver, settings or Settings(), touching)
 
 
 def _renamed(error: SceneError) -> SceneError:
@@ -126,15 +120,12 @@ class ParametricEquilibrium:
     ----------
     solver : EquilibriumSolver
     settings : Settings
-    choosing : Choosing or None
-        Where strings may be slack and springs have stops: the solvers of other choices of what is taut and at a stop.
     touching : Touching or None
         Where something may touch: the solvers of what else touches.
     """
 
     solver: EquilibriumSolver
     settings: Settings
-    choosing: Choosing | None = None
     touching: Touching | None = None
 
     def __repr__(self) -> str:
@@ -210,8 +201,6 @@ class ParametricEquilibrium:
             No equilibrium was found.
         """
         numbers = self.flat(values)
-        if self.choosing is not None:
-            return self._chosen(self.choosing, numbers, start)
         if self.touching is not None:
             return self._touching(self.touching, numbers, start)
         return self._solved(numbers, start)
@@ -300,23 +289,6 @@ class ParametricEquilibrium:
         scene = solver.scene.model_copy(update={"analysis": solver.scene.analysis.model_copy(update=asked)})
         return plain_cases(scene, solver.arguments.arguments, results, self.settings, places=places, known=known)
 
-    def _chosen(self, choosing: Choosing, numbers: Array, start: ParametricAnswer | None) -> ParametricAnswer:
-        """The equilibrium in a choice of what is taut and at a stop that holds, beginning with that of ``start``."""
-        known: dict[Stops, ParametricAnswer] = {}
-        last = start
-
-        def answer(stops: Stops) -> Mapping[Unilateral, float]:
-            nonlocal last
-            of = self._in(choosing, stops)
-            if last is not None and last.of.solver is not of.solver:
-                state = choosing.moved(last.of.solver, last.near(numbers)[0], of.solver)
-                last = ParametricAnswer(of, numbers, replace(last.outcome, state=state))
-            last = known[stops] = of._solved(numbers, last)
-            return choosing.margins(of.solver, numbers, last.outcome.state)
-
-        first = self if start is None else start.of
-        return known[settled(self.solver.scene, answer, first.solver.model.mesh.stops)]
-
     def _touching(self, touching: Touching, numbers: Array, start: ParametricAnswer | None) -> ParametricAnswer:
         """The equilibrium in which nothing penetrates or pulls, with what touches in ``start`` if that may be so."""
         first = self if start is None else start.of
@@ -342,13 +314,6 @@ class ParametricEquilibrium:
             raise SolveError(Status.FAILED, f"{what}, where nothing else was found to touch", answer.outcome)
         return answer
 
-    def _in(self, choosing: Choosing, stops: Stops) -> ParametricEquilibrium:
-        """The same in a choice; one for each, as it keeps the functions of its derivatives."""
-        if stops not in choosing.equilibria:
-            solver = choosing.solver(stops)
-            choosing.equilibria[stops] = self if solver is self.solver else replace(self, solver=solver)
-        return choosing.equilibria[stops]
-
     def _solved(self, numbers: Array, start: ParametricAnswer | None) -> ParametricAnswer:
         """The equilibrium for numbers, in the choice of the solver."""
         near = () if start is None else start.near(numbers)
@@ -364,7 +329,10 @@ class ParametricEquilibrium:
     @functools.cached_property
     def implicit(self) -> Implicit:
         """Evaluates derivatives by the implicit function theorem."""
-        return Implicit(self.solver.arguments, self.solver.results, self.solver.method.mass, unique=self.solver.unique)
+        solver = self.solver
+        return Implicit(
+            solver.arguments, solver.results, solver.method.mass, unique=solver.unique, switches=solver.switches
+        )
 
 
 def _given(one: Argument, value: ArrayLike) -> Array:
@@ -550,8 +518,8 @@ class ParametricAnswer:
 
     @functools.cached_property
     def _slopes(self) -> Slopes:
-        if self.of.choosing is not None:
-            self.of.choosing.refuse_doubt(self.of.solver, self.numbers, self.outcome.state)
+        if self.of.solver.switches is not None:
+            self.of.solver.switches.refuse_doubt(self.outcome.state)
         if self.of.touching is not None:
             self.of.touching.refuse_doubt(self.of.solver, self.numbers, self.outcome)
         return self.of.implicit.slopes(self._whole, self.outcome.state)
@@ -647,7 +615,10 @@ class ParametricAnswer:
         solver, model = self.of.solver, self.of.solver.model
         scene = solver.arguments.scene_at(self.numbers)
         assembly: Any = model.assembly
-        finer = assemble(scene, model.mesh.refined(), assembly=assembly, scales=model.scales)
+        mesh = model.mesh.refined()
+        if solver.switches is not None:
+            mesh = replace(mesh, stops=solver.switches.stops(self.outcome.state), switched=False)
+        finer = assemble(scene, mesh, assembly=assembly, scales=model.scales)
         program = Program(Expressions(Equations(finer, kernels="interpreted"), "interpreted"))
         prepared, loading = Prepared(finer), finer.loading(scene.analysis.steps[-1])
         start = transferred(model, solver.arguments.program.equations.state(self.outcome.state), finer)

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 
+from ..errors import SolveError, Status
 from ..mathematics.arrays import Array, Index
 from ..mechanics.segments import switch_of
 from ..mechanics.unilateral import Stops, Unilateral, unilaterals, worst_of
@@ -20,6 +22,9 @@ __all__ = ["BEYOND", "Switches"]
 
 BEYOND = 1e-9
 """How much below zero a margin may be, dimensionless: more than rounding leaves of what is zero."""
+
+STRICT = 1e-7
+"""Margins, dimensionless, that are as small leave it to a change of a number to which side of a change it leads."""
 
 ROUNDS = 4
 """Choices at most, over the number of constraints and one more: each is usually switched once."""
@@ -94,6 +99,35 @@ class Switches:
         """What acts at an equilibrium (states,), as numbers (n,): what has a force and no opening."""
         return (np.abs(state[self.multipliers]) > np.abs(state[self.openings])).astype(float)
 
+    def margins(self, state: Array, acting: Array) -> Array:
+        """The margins (n,) at an equilibrium (states,), dimensionless, with what acts (n,)."""
+        return np.where(acting != 0.0, state[self.multipliers], -state[self.openings]) * self.signs
+
+    def stops(self, state: Array) -> Stops:
+        """What acts at an equilibrium (states,) as the choice of a mesh."""
+        pairs = zip(self.constraints, self.acting(state).tolist(), strict=True)
+        return tuple(sorted(one.entry for one, now in pairs if bool(now) != (one.side == "slack")))
+
+    def refuse_doubt(self, state: Array) -> None:
+        """Refuse derivatives at an equilibrium (states,) where they differ to the sides of a change.
+
+        Raises
+        ------
+        SolveError
+            A constraint has no margin; names it.
+        """
+        margins = self.margins(state, self.acting(state))
+        for one, margin in zip(self.constraints, margins.tolist(), strict=True):
+            if margin <= STRICT:
+                detail = f"{one.becomes(self.stops(state))} there, and derivatives differ to either side"
+                raise SolveError(Status.KINK, detail)
+
+    def expression(self, given: ca.MX, state: ca.MX) -> ca.MX:
+        """What is given, as a symbol, with what acts at an equilibrium."""
+        found, multiplier, opening = ca.MX(given), self.multipliers.tolist(), self.openings.tolist()
+        found[self.flags.tolist()] = ca.fabs(state[multiplier]) > ca.fabs(state[opening])
+        return found
+
     def exact(self, state: Array, acting: Array) -> Array:
         """An equilibrium (states,) of a choice with zeros, not with what rounding leaves of them."""
         state = state.copy()
@@ -109,8 +143,7 @@ class Switches:
     def switched(self, state: Array, acting: Array) -> Array | None:
         """What acts in the next choice, after an equilibrium (states,) of one; None where that one holds."""
         active = acting != 0.0
-        margins = np.where(active, state[self.multipliers], -state[self.openings]) * self.signs
-        worst = worst_of(margins, active, self.strings, BEYOND)
+        worst = worst_of(self.margins(state, acting), active, self.strings, BEYOND)
         if worst is None:
             return None
         found = acting.copy()

@@ -1,17 +1,13 @@
-"""What is looked at beside an equilibrium with what touches, or is taut or at a stop, as it was.
+"""What is looked at beside an equilibrium with what touches as it was, as in generated code.
 
-Of stops and of strings that may be slack these are tensions, reactions of stops, and gaps, which are the residuals of
-their rows in a model in which they are active.
-
-Of contacts margins, dimensionless, are below zero where something else touches: how hard each place pushes, how far it
-is from the ends of its members, and gaps of places along members, from obstacles and from each other.  Between these
-the least gap is that of a parabola.  Near a place that touches there is no other margin.
+Margins, dimensionless, are below zero where something else touches: how hard each place pushes, how far it is from the
+ends of its members, and gaps of places along members, from obstacles and from each other.  Between these the least gap
+is that of a parabola.  Near a place that touches there is no other margin.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
 
 import casadi as ca
 import numpy as np
@@ -21,15 +17,13 @@ from ..contact.nearby import Nearby, Places
 from ..description.answers import answer_name
 from ..description.obstacles import members_of
 from ..errors import SceneError
-from ..mathematics.arrays import Array, Index
-from ..mechanics.fields import numbers_like
-from ..mechanics.model import Model, assemble
+from ..mathematics.arrays import Array
+from ..mechanics.model import Model
 from ..mechanics.singles import turned_vector
-from ..mechanics.unilateral import unilaterals
-from .arguments import Argument, Arguments, refuse_idle
+from .arguments import Argument, Arguments
 from .results import Outputs, Results
 
-__all__ = ["Gauge", "gauges_of", "refuse_idle_in_all", "stop_margins_of", "watched_of"]
+__all__ = ["watched_of"]
 
 LEAST = -1e-5
 """Margin from which on something else touches: parabolas miss gaps by less than that of the size of the scene."""
@@ -59,97 +53,6 @@ def watched_of(name: str, base: Model, known: Arguments) -> ca.Function:
     margins = _contact_margins(name, base, known.arguments)
     inputs = margins.mx_in()
     return ca.Function(name, inputs, [margins(*inputs) - LEAST], margins.name_in(), margins.name_out())
-
-
-@dataclass(frozen=True, eq=False)
-class Gauge:
-    """A model in which some unilateral constraints are active, for the residuals of their rows.
-
-    Attributes
-    ----------
-    arguments : Arguments
-    gaps : Function
-        (arguments, state) -> residuals of all rows, dimensionless.
-    """
-
-    arguments: Arguments
-    gaps: ca.Function
-
-    @property
-    def model(self) -> Model:
-        """The model."""
-        return self.arguments.model
-
-
-def gauges_of(base: Model, arguments: Sequence[Argument], *, unique: bool = True) -> dict[str, Gauge]:
-    """The models that tell gaps, with all strings taut: all springs at their stops, low ones and high ones."""
-    constraints, found = unilaterals(base.scene), {}
-    for side in ("low", "high") if any(one.table == "springs" for one in constraints) else ("low",):
-        mesh = replace(base.mesh, stops=tuple(one.entry for one in constraints if one.side == side))
-        model = assemble(base.scene, mesh, assembly=base.assembly, scales=base.scales)  # type: ignore[arg-type]
-        known = Arguments(base.scene, model, arguments, Results(model, [], {}, unique=unique), needed=False)
-        program, p = known.program, ca.MX.sym("arguments", known.size)
-        rows = ca.densify(program.forces.residual[program.equations.unknowns :])
-        gaps = ca.Function("gaps", [program.state_symbol, program.symbol], [rows])
-        state = ca.MX.sym("state", gaps.size1_in(0))
-        found[side] = Gauge(known, ca.Function("gaps", [p, state], [gaps(state, known.prepare("prepare")(p))]))
-    return found
-
-
-def refuse_idle_in_all(known: Arguments, gauges: Mapping[str, Gauge]) -> None:
-    """Refuse numbers on which nothing depends, whatever is taut and at a stop.
-
-    Raises
-    ------
-    SceneError
-        Names the first.
-    """
-    others = [gauge.arguments.idle for gauge in gauges.values()]
-    refuse_idle([name for name in known.idle if all(name in idle for idle in others)])
-
-
-def stop_margins_of(name: str, base: Model, known: Arguments, gauges: Mapping[str, Gauge]) -> ca.Function:
-    """``(arguments, state, given) ->`` margins (n,), dimensionless, of the unilateral constraints of the scene in its
-    order: below zero where another choice of what is taut and at a stop holds.
-
-    Parameters
-    ----------
-    name : str
-        Of the function.
-    base : Model
-        In a choice.
-    known : Arguments
-        Of the same model.
-    gauges : mapping of str to Gauge
-        See :func:`gauges_of`.
-    """
-    p, program, stops = ca.MX.sym("arguments", known.size), known.program, base.mesh.stops
-    state = ca.MX.sym("state", program.state_symbol.numel())
-    q, y, lam, counted = ca.vertsplit(state, [0, *program.equations.parts, state.numel()])
-    gaps = {}
-    for side, gauge in gauges.items():
-        numbers, counts = numbers_like(base, gauge.model)
-        rows = ca.DM.zeros(len(gauge.model.row_names))
-        there = ca.vertcat(q, _chosen(y, numbers), rows, _chosen(counted, counts))
-        gaps[side] = gauge.gaps(p, there)
-    found = []
-    for one in unilaterals(base.scene):
-        low = one.side == "low"
-        if one.active(stops):
-            value = -lam[base.row_names.index(one.row)]
-        else:
-            side = "low" if low else tuple(gauges)[-1]
-            value = gaps[side][gauges[side].model.row_names.index(one.row)]
-        found.append(value if low else -value)
-    margins = ca.vertcat(*found)
-    return ca.Function(name, [p, state, program.symbol], [margins], ["arguments", "state", "given"], ["margins"])
-
-
-def _chosen(values: ca.MX, numbers: Index) -> ca.MX:
-    """Values by their numbers, zero for -1."""
-    if not len(numbers):
-        return ca.MX(0, 1)
-    return ca.vertcat(values, 0.0)[np.where(numbers < 0, values.numel(), numbers).tolist()]
 
 
 def _contact_margins(name: str, base: Model, arguments: Sequence[Argument]) -> ca.Function:

@@ -58,7 +58,7 @@ MEANINGS = {
     Code.ITERATIONS: "no equilibrium within the iterations allowed",
     Code.STALLED: "no equilibrium: no step led further",
     Code.NOT_FINITE: "no equilibrium, or a result of it is not finite: the numbers left what can be computed",
-    Code.TOUCHES: "no equilibrium with what touches in the scene as given, or no choice of stops and strings that holds",
+    Code.TOUCHES: "no equilibrium with what touches as in the scene, or no choice of stops and strings that holds",
     Code.BAD_ARGUMENT: "an argument or the start is not a finite number, or an argument outside of its range",
 }
 """A sentence for each code."""
