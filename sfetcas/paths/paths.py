@@ -64,6 +64,9 @@ HOPED = 4.0
 PATIENCE = 5
 """After so many halvings one that does not halve the error is the last."""
 
+LOW = 4
+"""Order of elements that is relied on in contact."""
+
 FINE, ORDER = 3e-5, 6
 """Below this accuracy elements of this order save a halving of the mesh in the plane, where they cost hardly more time
 than those of order 4; not where laws have memory or something rubs, nor where modes are found at each point (measured).
@@ -301,8 +304,9 @@ class PathTracing:
         if self.fixed == set(self.scene.members):
             errors = self._errors(coarse, self._level(self._halved(mesh)), whose=coarse)
             return self._answer(coarse, errors, begin)
-        # The error falls by 4^p a halving; less is taken for granted.
-        gain, stalled = 1.0 if self.one_sequence else max(1.0, 4.0**mesh.order / MARGIN), 0
+        # The error falls by 4^p a halving; less is taken for granted, and no more where forces of contact are kinks.
+        order = min(mesh.order, LOW) if self.scene.contacts else mesh.order
+        gain, stalled = 1.0 if self.one_sequence else max(1.0, 4.0**order / MARGIN), 0
         for count in range(LEVELS):
             coarse = self._with_fronts(coarse)
             fine = self._level(self._halved(coarse.choices.mesh))
