@@ -2,8 +2,8 @@
 
 All problems of statics, modes and paths in the folder ``problems`` of the working folder are solved to several
 accuracies.  True errors are against the same equilibria on a quarter of the element lengths, in contact, of modes and
-of paths against the finest answer; effectivity is estimated over true error.  For 1e-6 the time is compared with that of
-the best mesh of equal elements.
+of paths against the finest answer; effectivity is estimated over true error.  For 1e-6 the time is compared with that
+of the best mesh of equal elements.
 """
 
 from __future__ import annotations
