@@ -87,7 +87,7 @@ def solve(
         try:
             return stops.solve_stopped(scene, settings)
         except SolveError as error:
-            if not scene.stopped or scene.contacts or settings.accuracy_of or scene.analysis.equilibria == "all":
+            if not stops.followable(scene, settings):
                 raise
             from .paths.steps_along import steps_along
 

@@ -11,7 +11,7 @@ from test_codegen import needs_compiler
 from test_contact_code import codes_of_both
 from test_stops import STOP, lever
 
-from sfetcas import Scene, SceneError, SolveError, export, load, solve
+from sfetcas import Scene, SceneError, SolveError, export, load, parametric, solve
 from sfetcas.mechanics.margins import margins
 from sfetcas.parametric.equilibrium import equilibrium_solver
 from sfetcas.solvers.globalised import Code
@@ -183,6 +183,69 @@ def test_c_begins_anew_as_the_process_does(tmp_path):
     scene, number, _ = SCENES["arch and string"]()
     solver = export(changed(scene, number, 3.0), tmp_path / "c", arguments=[number])
     assert codes_of_both(solver, tmp_path / "c", [[20.0]]) == [Code.SOLVED]
+
+
+def linked():
+    """Two rigid links with a string and stops of which only a path along growing loads finds a choice that holds."""
+    turning = {"node": "B", "between": ["AB", "BC"], "stiffness": 1.915, "stop": [-0.0264, 0.0214]}
+    sliding = {"type": "translational", "node": "C", "direction": [-1.5301, -0.4778], "stiffness": 0.385}
+    return Scene.from_dict(
+        {
+            "nodes": {
+                "A": {"position": [0, 0], "support": "hinge"},
+                "B": {"position": [-1.0174, -0.2867], "joint": "hinge"},
+                "C": {"position": [-1.5893, -0.5793]},
+            },
+            "members": {name: {"nodes": list(name), "type": "rigid"} for name in ("AB", "BC")},
+            "springs": {"k": turning, "t": {**sliding, "stop": [-0.2768, 0.0802]}},
+            "tendons": {"s": {"way": [{"node": "C"}, {"ground": [-1.4788, -0.5155]}], "length": 0.1356}},
+            "loads": {"m": {"type": "moment", "node": "C", "value": -0.196}},
+        }
+    )
+
+
+def test_what_is_found_along_a_path_only_is_parametric_and_exported():
+    scene = linked()
+    wanted = solve(scene).last
+    assert any("along a path" in note for note in wanted.notes)
+    names = ["nodes.C.position", "tendons.s.tension", "springs.k.stop", "springs.t.stop"]
+    found = parametric(scene, ["loads.m.value"], names).solve()
+    solver = solver_of(scene, results=names)
+    outcome, results = solver.solve()
+    assert outcome.code is Code.SOLVED
+    told = [wanted.position("C"), wanted.tendon("s")["tension"], *(wanted.fields.spring(k).stop for k in ("k", "t"))]
+    for by_name in (found.answers, solver.by_name(results)):
+        for name, value in zip(names, told, strict=True):
+            assert by_name[name] == pytest.approx(value, abs=1e-12)
+    assert [one.unit for one in solver.results.results] == ["m", "N", "N m", "N"]
+
+
+def test_where_newton_fails_from_afar_parameters_begin_with_statics():
+    """Two strings hold the end of a straight rod between them, which keeps its length."""
+    length = 0.5**0.5
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0}},
+            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+            "tendons": {
+                name: {"way": [{"node": "B"}, {"ground": [0.5, y]}], "length": length}
+                for name, y in (("up", 0.5), ("down", -0.5))
+            },
+            "loads": {"f": {"type": "force", "node": "B", "value": [0, 1]}},
+            "analysis": {"accuracy": 1e-7},
+        }
+    )
+    numbers = ["loads.f.value", "tendons.up.length", "tendons.down.length"]
+    values = {"loads.f.value": [2, -2], **dict.fromkeys(numbers[1:], 0.99999 * length)}
+    found = parametric(scene, numbers, ["nodes.B.position", "tendons.up.tension", "tendons.down.tension"])
+    outcome, _ = found.solver.solve(found.flat(values))
+    assert outcome.code is Code.STALLED
+    answer, wanted = found.solve(values), solve(found.scene_at(values)).last
+    assert answer["nodes.B.position"] == pytest.approx(wanted.position("B"), abs=1e-9)
+    for name in ("up", "down"):
+        # Of positions to 1e-9, beside a shortening of 1e-5.
+        assert answer[f"tendons.{name}.tension"] == pytest.approx(wanted.tendon(name)["tension"], rel=1e-4)
 
 
 def test_derivatives_are_those_of_what_acts():

@@ -911,6 +911,23 @@ def test_generated_code_finds_where_a_string_is_slack(tmp_path):
     assert tensions[1] > tensions[0] > tensions[2] == 0.0
 
 
+@pytest.mark.parametrize("given", [{"pull": 0.1}, {"length": 0.9}])
+def test_a_way_along_rigid_members_alone_has_no_length_to_give(given):
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "B": {"position": [1, 0]},
+            "C": {"position": [2, 0]},
+        },
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}, "r": {"nodes": ["B", "C"], "type": "rigid"}},
+        "tendons": {"t": {"way": [{"member": "r", "offset": 0.1}], **given}},
+    }
+    with pytest.raises(SceneError, match=r"tendons\.t\.way: found a way along rigid members alone, which is always"):
+        Scene.from_dict(table)
+    Scene.from_dict({**table, "tendons": {"t": {"way": [{"member": "r", "offset": 0.1}], "tension": 1.0}}})
+
+
 def test_a_pull_does_not_jump():
     """A motion cannot follow a length that jumps."""
     with pytest.raises(SceneError, match=r"tendons\.t: the key 'history' is missing"):

@@ -362,8 +362,8 @@ def test_parameters_know_which_string_is_taut():
         assert here["tendons.t.tension"] == pytest.approx(alone.tendon("t")["tension"], abs=1e-6)
         assert alone.tendon("t")["slack"] is slack
         np.testing.assert_allclose(here.certified().position("B"), here["nodes.B.position"], atol=1e-8)
-    # A slack string does nothing, whatever its length.
-    assert not exact.any()
+    # A slack string does nothing, whatever its length: rounding of the system that has its opening, too.
+    assert np.abs(exact).max() <= 1e-14
 
 
 def test_parameters_know_which_stop_is_reached():

@@ -173,7 +173,7 @@ springs.NAME.angle | rad | | all | of a rotational one, counting turns
 springs.NAME.moment | N m | | all | of a rotational one
 springs.NAME.travel | m | | all | of a translational one
 springs.NAME.force | N | | all | of a translational one
-springs.NAME.stop | N m, N | | statics, motion | of one with a stop: what that adds; zero away from it
+springs.NAME.stop | N m, N | | statics, motion, parameters | of one with a stop: what that adds; zero away from it
 tendons.NAME.tension | N | | all | below zero where it pushes, as a chamber
 tendons.NAME.length | m | | all | along its way
 tendons.NAME.slack | | | statics, motion | of one that does not push, with a length or stiffness

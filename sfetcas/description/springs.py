@@ -25,7 +25,7 @@ def _parties(value: Any) -> tuple[Any, ...]:
 
 
 def _stop(value: Any) -> tuple[float, float]:
-    accepted = "[low, high] with zero, the undeformed scene, between them or at one end"
+    accepted = "[low, high] with zero, the undeformed scene, between them or at one end, not at both"
     entries = tuple(number(entry) for entry in listed(value, accepted))
     if len(entries) != 2 or not entries[0] <= 0.0 <= entries[1] or entries[0] == entries[1]:
         raise ValueError(f"found {say(value)}, accepted: {accepted}")

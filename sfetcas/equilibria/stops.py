@@ -25,7 +25,7 @@ from .several import alike
 from .solution import Equilibrium, Solution, at_factor
 from .statics import Settings, solve
 
-__all__ = ["next_stops", "settled", "solve_stopped"]
+__all__ = ["followable", "next_stops", "settled", "solve_stopped"]
 
 
 Margins = Mapping[Unilateral, float]
@@ -55,6 +55,11 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
         status = found.status if status is Status.SOLVED else status
         seconds = {key: seconds[key] + found.seconds[key] for key in seconds}
     return Solution(scene, status, tuple(steps), seconds)
+
+
+def followable(scene: Scene, settings: Settings) -> bool:
+    """Whether load steps of which no choice is found may be looked for along a path."""
+    return scene.stopped and not (scene.contacts or settings.accuracy_of or scene.analysis.equilibria == "all")
 
 
 def _choices(scene: Scene) -> tuple[Stops, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mathematics.keeping import kept
 from .batches import GroupBatch
-from .connections import connections_of, row_of
+from .connections import SIDES, connections_of, row_of
 from .equations import Equations, State
 from .loading import Loading
 from .segments import elongation_of
@@ -192,7 +192,7 @@ class Balance:
         if record.stop is None:
             return state
         unit, names = self.model.scales.moment if state.rotational else self.model.scales.force, self.model.row_names
-        acting = [names.index(row) for side in ("low", "high") if (row := row_of("springs", name, side)) in names]
+        acting = [names.index(row) for side in SIDES if (row := row_of("springs", name, side)) in names]
         return replace(state, stop=0.0 - float(self._state.lam[acting].sum()) * unit)
 
     def answers(self, table: str, name: str) -> dict[str, float]:

@@ -15,9 +15,9 @@ from ..description.scene import Scene, check_scene
 from ..description.showing import shown
 from ..equilibria.settings import Settings
 from ..equilibria.single import solved_from
-from ..equilibria.solution import Equilibrium
+from ..equilibria.solution import Equilibrium, Solution
 from ..equilibria.statics import solve
-from ..equilibria.stops import solve_stopped
+from ..equilibria.stops import followable, solve_stopped
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.kernels import Direct
@@ -28,6 +28,7 @@ from ..mechanics.inputs import Inputs
 from ..mechanics.mesh import Mesh, every_other
 from ..mechanics.model import Model, assemble
 from ..mechanics.unilateral import all_stops
+from ..paths.steps_along import steps_along
 from ..solvers.globalised import MEANINGS, NOT_DEFINED, Code, Globalised, Outcome, Rules
 from ..solvers.prepared import Prepared, Solved
 from .arguments import Arguments, Asked, asked_for, in_words
@@ -45,6 +46,7 @@ __all__ = [
     "in_contact",
     "kept_of",
     "refuse_search",
+    "solved_steps",
     "touching_mesh",
     "what_touches",
 ]
@@ -458,6 +460,24 @@ def refuse_search(
         raise SceneError(f"turning axes are {lacking}, {instead}", ("rotating",))
 
 
+def solved_steps(scene: Scene, settings: Settings) -> Solution:
+    """The load steps of a static scene as of :func:`sfetcas.solve`.
+
+    Raises
+    ------
+    SceneError, SolveError
+        The scene cannot be modelled, or has no equilibrium that could be found.
+    """
+    if not scene.stopped:
+        return solve(scene, settings)
+    try:
+        return solve_stopped(scene, settings)
+    except SolveError as error:
+        if not followable(scene, settings):
+            raise
+        return steps_along(scene, settings, error)
+
+
 def asked_mesh(scene: Scene, settings: Settings, *, lines: bool = False) -> tuple[Mesh, Any, Equilibrium]:
     """The mesh that the accuracy requires, the assembly, and the static answer; ``lines`` as of :func:`touching_mesh`.
 
@@ -469,7 +489,7 @@ def asked_mesh(scene: Scene, settings: Settings, *, lines: bool = False) -> tupl
     static = scene.analysis.model_copy(update={"type": "static", "equilibria": "one"})
     still = scene.model_copy(update={"analysis": static})
     try:
-        solution = (solve_stopped if still.stopped else solve)(still, settings)
+        solution = solved_steps(still, settings)
     except SolveError as error:
         raise SceneError(f"the scene itself has no equilibrium: {error}, accepted: one that has") from None
     if scene.contacts:

@@ -21,7 +21,7 @@ from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers, values_of
 from ..mathematics.constants import sparse, times
-from ..mechanics.connections import connections_of
+from ..mechanics.connections import SIDES, connections_of, row_of
 from ..mechanics.laws import bent_by, law_data, law_of
 from ..mechanics.load_terms import spread_of
 from ..mechanics.magnetism import magnet_terms
@@ -194,9 +194,12 @@ class Results:
         if kind.table == "motions" and single_number(self.model.scene.motions[name.record], kind.key):
             components = ()
         columns = (len(components),) if name.component is None and components else ()
+        unit = kind.unit
+        if kind.table == "springs" and kind.key == "stop":
+            unit = "N m" if self.model.scene.springs[name.record].type == "rotational" else "N"
         what = f"{kind.key.replace('_', ' ')} {WHOSE[kind.table]}" + (f" {name.record}" if kind.named else "")
         more = "" if kind.meaning.startswith("of ") else f": {kind.meaning}"
-        return Result(text, name, (*rows, *columns), kind.unit or "1", what + more)
+        return Result(text, name, (*rows, *columns), unit or "1", what + more)
 
     def _check(self, name: AnswerName) -> None:
         """Refuse what is not told of such a model."""
@@ -464,7 +467,7 @@ class Outputs:
         if not key:
             return self._tangent(kind.table, record)
         if kind.table == "springs":
-            return self._connection("springs", record, key)
+            return self._stopped(record) if key == "stop" else self._connection("springs", record, key)
         if kind.table == "magnets":
             return self._magnet(record, key)
         if kind.table == "tendons":
@@ -829,6 +832,12 @@ class Outputs:
         groups = self._model.terms
         number, i = next(x for x in connections_of(groups, table, name) if key in groups[x[0]].kind.answers)
         return self._told(number, i, key)
+
+    def _stopped(self, name: str) -> ca.MX:
+        """What the stop of a spring adds to its moment or force."""
+        rotational, names = self._model.scene.springs[name].type == "rotational", self._model.row_names
+        found = [self._lam[names.index(row)] for side in SIDES if (row := row_of("springs", name, side)) in names]
+        return -sum(found, ca.MX(0)) * (self._model.scales.moment if rotational else self._model.scales.force)
 
     def _told(self, number: int, i: int, key: str) -> ca.MX:
         """A quantity of one term of a group."""

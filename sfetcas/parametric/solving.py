@@ -16,8 +16,6 @@ from ..description.scene import Scene, check_scene
 from ..description.showing import shown, stability_in_words, values_in_words
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
-from ..equilibria.statics import solve
-from ..equilibria.stops import solve_stopped
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
@@ -30,7 +28,7 @@ from ..solvers.globalised import MEANINGS, NOT_DEFINED, Code, Globalised, Outcom
 from ..solvers.prepared import Prepared
 from ..solvers.program import Program
 from .arguments import Argument, Asked, in_words
-from .equilibrium import SOLVED, EquilibriumSolver, Place, equilibrium_solver, refuse_search
+from .equilibrium import SOLVED, EquilibriumSolver, Place, equilibrium_solver, refuse_search, solved_steps
 from .implicit import Implicit, Slopes
 from .plain import PlainCases, plain_cases
 from .results import Result, Results
@@ -320,11 +318,24 @@ class ParametricEquilibrium:
         outcome = self.solver.found(numbers, *near)
         if outcome.code not in SOLVED and start is not None:
             outcome = self.solver.found(numbers)
+        if outcome.code not in SOLVED and self.solver.switches is not None:
+            outcome = self._from_statics(numbers) or outcome
         if outcome.code not in SOLVED:
             status = Status.ITERATIONS if outcome.code is Code.ITERATIONS else Status.FAILED
             said = ", ".join(f"{name} = {x:.6g}" for name, x in zip(self.numbers, numbers, strict=True))
             raise SolveError(status, f"{MEANINGS[outcome.code]}, at {said}", outcome)
         return ParametricAnswer(self, numbers, outcome)
+
+    def _from_statics(self, numbers: Array) -> Outcome | None:
+        """The equilibrium that begins with the answer of statics for numbers; None where there is none.
+
+        Strings that act together on what is straight are beyond Newton's method from afar.
+        """
+        try:
+            answer = solved_steps(self.scene_at(self.by_parameter(numbers)), self.settings).last
+        except (SceneError, SolveError):
+            return None
+        return self.solver.found(numbers, transferred(answer.model, answer.state, self.solver.model).flat)
 
     @functools.cached_property
     def implicit(self) -> Implicit:
@@ -646,4 +657,4 @@ class ParametricAnswer:
             No equilibrium was found.
         """
         scene = self.of.scene_at(self.values)
-        return (solve_stopped if scene.stopped else solve)(scene, self.of.settings).last
+        return solved_steps(scene, self.of.settings).last
