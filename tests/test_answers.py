@@ -245,7 +245,8 @@ def test_expressions_say_what_answers_say():
     )
     met = set()
     yielding = beam({**square, "stretch": True, "shear": True}, loads=force)
-    for scene in (frame(), rod, yielding, driven("plane"), driven("space"), sheath, ringed, pressed):
+    stopped = beam(square, loads=force, springs={"k": {"node": "B", "stiffness": 1e-3, "stop": [-1e-3, 1e-3]}})
+    for scene in (frame(), rod, yielding, driven("plane"), driven("space"), sheath, ringed, pressed, stopped):
         names = []
         for kind in (kind for kind in ANSWERS if {"statics", "parameters"} <= set(kind.where)):
             table = {"reactions": "nodes"}.get(kind.table, kind.table)

@@ -215,7 +215,8 @@ def test_assemblies_agree(assembly, lee_path):
 
 
 def test_space_finds_what_the_plane_finds():
-    found = lee(accuracy=1e-4)
+    # Meshes differ: ends that nothing bends in the plane a hinge in space may bend.
+    found = lee(accuracy=1e-7)
     found["sections"]["strip"] |= {"EI2": 20000.0, "GJ": 20000.0}
     plane, space = solve(made(found)), solve(made(found, dimension="space"))
     assert space.model.space

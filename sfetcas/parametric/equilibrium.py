@@ -261,7 +261,7 @@ class EquilibriumSolver:
             if there is None:
                 return replace(outcome, state=self.switches.exact(outcome.state, acting))
             acting, start = there, outcome.state
-        return replace(outcome, code=Code.TOUCHES, negative=NOT_DEFINED)
+        return outcome if outcome.code not in SOLVED else replace(outcome, code=Code.TOUCHES, negative=NOT_DEFINED)
 
     def _fitted(
         self, arguments: Array, start: Array | None, places: Array | None, acting: Array | None = None
