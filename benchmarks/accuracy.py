@@ -65,17 +65,19 @@ def problems_of(kind: str) -> dict[str, Scene]:
 def knob() -> None:
     """Effectivity, share of answers that keep what was asked for, and time against the best mesh by hand."""
     scenes, references = _kept("static")
-    _against_the_best(scenes, references)
+    _against_the_best(scenes, references, NAMES["static"])
 
 
 def estimates() -> None:
     """Effectivity, share of answers that keep what was asked for, and time against the best mesh by hand, of modes and
     of paths.
     """
+    found = {}
     for kind in ("modes", "path"):
-        scenes, references = _kept(kind)
-        _against_the_best(scenes, references)
+        found[kind] = _kept(kind)
         print()
+    for kind, (scenes, references) in found.items():
+        _against_the_best(scenes, references, NAMES[kind])
 
 
 NAMES = {"static": "statics", "modes": "modes", "path": "paths"}
@@ -126,8 +128,8 @@ def _error(run: Measurement, reference: Measurement) -> float:
     return run.observation.error(reference.observation)
 
 
-def _against_the_best(scenes: dict[str, Scene], references: dict[str, Measurement]) -> None:
-    print(f"\nA whole run with accuracy = {COMPARED:g} against the best mesh of equal elements; milliseconds\n")
+def _against_the_best(scenes: dict[str, Scene], references: dict[str, Measurement], what: str) -> None:
+    print(f"\nA whole run of {what}, accuracy = {COMPARED:g}, against the best mesh of equal elements; milliseconds\n")
     head("problem", "whole run", "best mesh", "ratio", "that mesh")
     ratios = {}
     for name, scene in scenes.items():
