@@ -6,7 +6,8 @@ from scenes import SOFT, made
 
 from benchmarks.scenes import woven
 from sfetcas import first_mesh
-from sfetcas.mechanics.carried import _parts, carried
+from sfetcas.mechanics.carried import _parts, carried, loose_ends
+from sfetcas.mechanics.mesh import every_other
 
 
 def tree(parents, forces, **more):
@@ -110,3 +111,70 @@ def test_bridges_are_what_falls_apart_without_them(seed):
             if loops[e] >= 0:
                 # of the same loops: no single edge keeps them together
                 assert (loops[e] == loops[f]) == together[a, edges[f, 0]]
+
+
+ENDS = {
+    "free": ({}, True),
+    "in space": ({"dimension": "space"}, True),
+    "moment": ({"loads": {"m": {"type": "moment", "node": "B", "value": 1.0}}}, False),
+    "moment along": ({"loads": {"m": {"type": "moment", "member": "m", "at": 0.5, "value": 1.0}}}, False),
+    "spring": ({"springs": {"k": {"node": "B", "stiffness": 1.0}}}, False),
+    "pulled by a spring": ({"springs": {"k": {"type": "translational", "node": "B", "stiffness": 1.0}}}, True),
+    "held": ({"nodes": {"B": {"position": [1, 0], "support": "slider", "direction": [1, 0]}}}, False),
+    "hinge": ({"nodes": {"B": {"position": [1, 0], "support": "hinge"}}}, True),
+    "hinge in space": ({"dimension": "space", "nodes": {"B": {"position": [1, 0], "support": "hinge"}}}, False),
+    "ball in space": ({"dimension": "space", "nodes": {"B": {"position": [1, 0], "support": "ball"}}}, True),
+    "goes on": ({"nodes": {"C": {"position": [2, 0]}}, "members": {"n": {"nodes": ["B", "C"], "section": "s"}}}, False),
+    "goes on from a hinge": (
+        {
+            "nodes": {"B": {"position": [1, 0], "joint": "hinge"}, "C": {"position": [2, 0]}},
+            "members": {"n": {"nodes": ["B", "C"], "section": "s"}},
+        },
+        True,
+    ),
+    "released": (
+        {
+            "nodes": {"C": {"position": [2, 0]}},
+            "members": {
+                "m": {"nodes": ["A", "B"], "section": "s", "release": ["rigid", "hinge"]},
+                "n": {"nodes": ["B", "C"], "section": "s"},
+            },
+        },
+        True,
+    ),
+    "curved": (
+        {"members": {"m": {"nodes": ["A", "B"], "section": "s", "shape": {"type": "arc", "angle": 0.5}}}},
+        False,
+    ),
+    "actuated": ({"actuations": {"a": {"member": "m", "value": 1.0}}}, False),
+    "heavy end": ({"nodes": {"B": {"position": [1, 0], "mass": 1.0, "inertia": [0, 0, 1.0]}}}, False),
+}
+"""What is at the second end of a member, and whether nothing bends it there."""
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_elements_are_short_where_something_bends_the_end(name):
+    more, loose = ENDS[name]
+    table = {
+        "sections": {"s": {**SOFT}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "loads": {"f": {"type": "distributed", "member": "m", "value": [0, -1e6]}},
+    }
+    for key, records in more.items():
+        table[key] = {**table.get(key, {}), **records} if isinstance(records, dict) else records
+    scene = made(table)
+    assert loose_ends(scene)["m"] == (False, loose)
+    lengths = np.diff(first_mesh(scene, 4).cuts["m"])
+    # Layers are a thousandth of the length.
+    assert lengths[0] < 2e-3
+    assert (lengths[-1] > 0.1) == loose
+
+
+def test_half_of_a_mesh_keeps_ends_where_something_acts():
+    table = tree([0], {1: 1.0})
+    table["loads"]["within"] = {"type": "force", "member": "1", "at": 0.3, "value": [0, 1.0]}
+    scene = made(table)
+    cuts = np.array([0.0, 0.3, 0.5, 0.75, 1.0])
+    assert every_other(scene, "1", cuts).tolist() == [0.0, 0.3, 0.5, 1.0]
+    assert every_other(scene, "1", np.array([0.0, 0.15, 0.3, 0.65, 1.0])).tolist() == [0.0, 0.3, 1.0]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sfetcas import Analysis, Arc, CrossSection, Load, Member, Node, Scene, SceneError, Spring, load, solve
+from sfetcas import Analysis, Arc, CrossSection, Load, Member, Node, Scene, SceneError, Spring, Status, load, solve
 from sfetcas.cli import main
 from sfetcas.description.scenefile import dump
 
@@ -297,3 +297,25 @@ def test_estimated_error_is_no_less_than_rounding():
     found = solve(scene, accuracy=1e-6)
     error = np.abs(found.omega[: len(wanted)] / np.array(wanted) - 1.0).max()
     assert 0.0 < error <= found.error_estimate <= 1e-6
+
+
+def test_only_rough_elements_are_halved():
+    """Waves of a hanging chain shorten towards its free end, where hardly anything pulls."""
+    found = solve(load(PROBLEMS / "vibration_hanging_chain.toml"), accuracy=1e-6)
+    lengths = np.diff(found.motion.model.mesh.cuts["beam"])
+    assert found.error_estimate <= 1e-6
+    assert found.motion.model.mesh.elements < 32
+    assert lengths[-1] < 0.2 * lengths[0]
+
+
+def test_modes_begin_on_the_mesh_before_the_last_halving():
+    scene = load(PROBLEMS / "vibration_bent_cantilever_2.toml")
+    found = solve(scene, accuracy=1e-4)
+    # Statics halved all elements to see its error, modes do so once themselves.
+    assert found.motion.model.mesh.elements == found.last.model.mesh.elements
+
+
+def test_what_rounding_alone_would_change_is_not_halved_further():
+    found = solve(load(PROBLEMS / "vibration_wing_mass_aside.toml"), accuracy=1e-7)
+    assert found.status is Status.SHORT
+    assert found.motion.model.mesh.elements < 12

@@ -13,6 +13,7 @@ from scenes import ZOO, cantilever
 
 from sfetcas import Scene, SceneError, SolveError, Status, check, dump, load, solve, solve_model, switch
 from sfetcas.cli import main
+from sfetcas.equilibria.settings import Settings
 from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.model import assemble
 from sfetcas.paths import paths, switching
@@ -212,6 +213,30 @@ def test_assemblies_agree(assembly, lee_path):
     # The same mesh and equations, other unknowns: rounding.
     for one, other in zip(path.limit_points, lee_path.limit_points, strict=True):
         assert one.factor == pytest.approx(other.factor, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "more", "order"),
+    [(1e-4, {}, 4), (1e-6, {}, 6), (1e-6, {"dimension": "space"}, 4), (1e-6, {"analysis__modes": 2}, 4)],
+)
+def test_elements_are_of_higher_order_where_that_saves_a_halving(accuracy, more, order):
+    found = lee(accuracy=accuracy, range=[0, 1.0])
+    found["sections"]["strip"] |= {"EI2": 720.0, "GJ": 720.0, "rhoA": 1.0}
+    path = solve(made(found, **more))
+    # Modes have a mesh of their own.
+    assert path.model.element.order == order
+    assert path.error_estimate <= accuracy
+
+
+@pytest.mark.parametrize(("name", "order"), [("arch_caught_by_a_string", 6), ("column_between_walls", 4)])
+def test_in_contact_the_estimate_relies_on_low_order(monkeypatch, name, order):
+    """Forces of contact within elements are kinks."""
+    tracing = paths.PathTracing(load(PROBLEMS / f"{name}.toml"), Settings(accuracy=1e-5))
+    found, once = [], tracing._errors
+    monkeypatch.setattr(tracing, "_errors", lambda *levels: found.append(once(*levels)) or found[-1])
+    path = tracing.path()
+    assert path.model.element.order == 6
+    assert path.error_estimate == pytest.approx(max(found[-1].values()) / (4.0**order / paths.MARGIN))
 
 
 def test_space_finds_what_the_plane_finds():

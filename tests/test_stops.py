@@ -6,6 +6,7 @@ from scenes import SOFT, made
 
 from sfetcas import SceneError, dump, solve
 from sfetcas.cli import main
+from sfetcas.mechanics.unilateral import worst_of
 
 STOP = (-0.2, 0.5)
 
@@ -122,3 +123,17 @@ def test_report_tells_what_the_stop_does(tmp_path, capsys):
     lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  spring k")]
     assert "stop 0 N m" in lines[0]
     assert "angle 0.5 rad, moment -1 N m, stop -" in lines[1]
+
+
+def test_the_worst_is_switched_first():
+    """Strings before stops, what acts before what does not; of equal ones the first, rounding aside; none within it."""
+
+    def worst(margins, active, strings, least=1e-9):
+        return worst_of(np.array(margins), np.array(active, dtype=bool), np.array(strings, dtype=bool), least)
+
+    assert worst([-1.0, -2.0, -3.0], [1, 1, 0], [0, 0, 0]) == 1
+    assert worst([-1.0, -2.0, -0.1], [1, 1, 0], [0, 0, 1]) == 2
+    assert worst([-0.1, -5.0], [1, 0], [1, 1]) == 0
+    assert worst([-1.0, -1.0 - 1e-14], [1, 1], [0, 0]) == 0
+    assert worst([-1e-10, 2.0], [1, 0], [0, 1]) is None
+    assert worst([], [], []) is None
