@@ -38,7 +38,7 @@ class Switches:
     ----------
     constraints : tuple of Unilateral
     flags : ndarray (n,)
-        Where in what is given (:attr:`~sfetcas.solvers.program.Program.symbol`) it stands whether each is active.
+        Where in what is given to the program it stands whether each is active.
     multipliers, openings : ndarray (n,)
         Where in a flat state these are.
     default : ndarray (n,)
