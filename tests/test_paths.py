@@ -236,7 +236,7 @@ def test_in_contact_the_estimate_relies_on_low_order(monkeypatch, name, order):
     monkeypatch.setattr(tracing, "_errors", lambda *levels: found.append(once(*levels)) or found[-1])
     path = tracing.path()
     assert path.model.element.order == 6
-    assert path.error_estimate == pytest.approx(max(found[-1].values()) / (4.0**order / paths.MARGIN))
+    assert path.error_estimate == pytest.approx(max(found[-1].values()) / 2.0**order)
 
 
 def test_space_finds_what_the_plane_finds():

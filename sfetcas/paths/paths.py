@@ -53,7 +53,7 @@ LEVELS = 10
 """Most halvings of the first mesh."""
 
 MARGIN = 16.0
-"""A halving gains this many times less than its order promises, as far as estimates go."""
+"""A halving gains this many times less than its order p promises, as far as estimates go, and no more than 2^p."""
 
 STEADY = 0.3
 """Share of the factor in the tangent from which on a point may be compared at its factor."""
@@ -306,7 +306,7 @@ class PathTracing:
             return self._answer(coarse, errors, begin)
         # The error falls by 4^p a halving; less is taken for granted, and no more where forces of contact are kinks.
         order = min(mesh.order, LOW) if self.scene.contacts else mesh.order
-        gain, stalled = 1.0 if self.one_sequence else max(1.0, 4.0**order / MARGIN), 0
+        gain, stalled = 1.0 if self.one_sequence else max(1.0, min(4.0**order / MARGIN, 2.0**order)), 0
         for count in range(LEVELS):
             coarse = self._with_fronts(coarse)
             fine = self._level(self._halved(coarse.choices.mesh))
