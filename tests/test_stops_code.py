@@ -181,8 +181,27 @@ def test_c_has_the_bits_of_the_process(name, tmp_path):
 def test_c_begins_anew_as_the_process_does(tmp_path):
     """Beyond its snap the arch has no equilibrium without the string that is loose before."""
     scene, number, _ = SCENES["arch and string"]()
-    solver = export(changed(scene, number, 3.0), tmp_path / "c", arguments=[number])
+    # Compliances hang on what acts, too.
+    names = ["nodes.load.position", "tendons.string.tension", "compliance.load"]
+    solver = export(changed(scene, number, 3.0), tmp_path / "c", arguments=[number], results=names)
     assert codes_of_both(solver, tmp_path / "c", [[20.0]]) == [Code.SOLVED]
+
+
+def test_compliance_is_that_with_what_acts():
+    for value in (-3.0, 0.5, 2.0):
+        scene = made(along()).replace({"loads.f.value.1": value})
+        solver = solver_of(scene, arguments=["loads.f.value.1"], results=["compliance.H"])
+        outcome, results = solver.solve()
+        found = parametric(scene, ["loads.f.value.1"], ["compliance.H"]).solve()
+        pushed = []
+        for force in (-1e-4, 1e-4):
+            push = {"type": "force", "node": "H", "value": [0, force]}
+            pushed.append(solve(scene.replace({"loads.push": push})).last.position("H")[1])
+        # Central differences of positions to 1e-12 or so.
+        wanted = pytest.approx((pushed[1] - pushed[0]) / 2e-4, rel=1e-6)
+        assert outcome.code is Code.SOLVED
+        assert solver.by_name(results)["compliance.H"][1, 1] == wanted
+        assert found["compliance.H"][1, 1] == wanted
 
 
 def linked():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import textwrap
 from typing import Any
 
 import casadi as ca
@@ -19,12 +20,7 @@ from .rendering import Status, Writer, defined, filled, row, rows, template
 
 __all__ = ["EquilibriumWriter"]
 
-SWITCHED = """  {
-    double acting[SF_SWITCHES];
-    sf_acting(state, acting);
-    sf_switch(m->given, acting);
-  }
-"""
+SWITCHED = "  sf_switch_as(m->given, state);\n"
 """What derivatives begin with: what acts at the state."""
 
 SLOPES = "`{name}_sensitivities` gives the derivatives of all results by all arguments at a solution.\n\n"
@@ -99,11 +95,14 @@ class EquilibriumWriter(Writer):
         names: dict[str, object] = {"name": self.name, "NAME": self.name.upper()}
         flexible = counted(self.model.mesh.elements, f"{self.model.element.name} element")
         unknowns = counted(self.arguments.expressions.total, "unknown")
-        started = self.solver.start is not None
+        started, switched = self.solver.start is not None, self.solver.switches is not None
+        find = filled(template("find.c"), names)
+        if switched:
+            find = filled(template("find_switched.c"), {**names, "once": textwrap.indent(find, "  ")})
         return {
             **self._sizes,
-            "find": filled(template("find.c" if self.solver.switches is None else "find_switched.c"), names),
-            "switched": SWITCHED if self.solver.switches is not None else "",
+            "find": find,
+            "switched": SWITCHED if switched else "",
             "indent": " " * len(f"int {self.name}_solve("),
             "margins_declared": f"\n  double margins[{self._margins}];" if self._margins else "",
             "sensitivities_declared": filled(template("sensitivities.h"), names) if self._sensitivities else "",

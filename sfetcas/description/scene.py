@@ -570,8 +570,8 @@ def _check_tendons(scene: Scene) -> None:
             check_pieces(scene.tendon_pieces[name], scene.center_lines)
         except SceneError as error:
             raise error.within("tendons", name) from None
-        along = [scene.members[p.member].type for p in scene.tendon_pieces[name] if isinstance(p, Stretch)]
-        if tendon.measured and along == ["rigid"] * len(scene.tendon_pieces[name]):
+        pieces = scene.tendon_pieces[name]
+        if tendon.measured and all(isinstance(p, Stretch) and scene.members[p.member].type == "rigid" for p in pieces):
             message = "found a way along rigid members alone, which is always as long, accepted: one that changes"
             raise SceneError(f"{message}, or a tension", ("tendons", name, "way"))
         if tendon.rubs:

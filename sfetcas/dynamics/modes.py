@@ -361,12 +361,16 @@ class ModalAnalysis:
     def _mesh(self) -> Mesh:
         mesh = self.meshing.target
         if self.rest is not None:
-            # All elements were halved at the end, to see the error.
-            fixed, cuts = self.meshing.fixed, self.rest.model.mesh.cuts
-            coarse = {n: own if n in fixed else every_other(self.scene, n, own) for n, own in cuts.items()}
-            cuts = coarse if self.kept is None else self.kept.cuts()
-            mesh = replace(mesh, cuts=cuts, stops=self.rest.model.mesh.stops)
+            mesh = replace(mesh, cuts=self._cuts(self.rest.model.mesh), stops=self.rest.model.mesh.stops)
         return replace(mesh, order=mesh.order if self.meshing.named else ORDER, places=True)
+
+    def _cuts(self, mesh: Mesh) -> Mapping[str, Array]:
+        """The ends of elements to begin with, from the mesh of the equilibrium."""
+        if self.kept is not None:
+            return self.kept.cuts()
+        # All elements were halved at the end, to see the error.
+        fixed = self.meshing.fixed
+        return {n: cuts if n in fixed else every_other(self.scene, n, cuts) for n, cuts in mesh.cuts.items()}
 
     def modes(self) -> Modes:
         """The modes on the finest mesh that was needed, with their estimated error.

@@ -15,10 +15,10 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mathematics.keeping import kept
 from .batches import GroupBatch
-from .connections import SIDES, connections_of, row_of
+from .connections import connections_of, row_of
 from .equations import Equations, State
 from .loading import Loading
-from .segments import elongation_of
+from .segments import SIDES, elongation_of
 from .tendon_chains import part_of
 from .terms import answers_of
 

@@ -36,11 +36,7 @@ from .rotations import Pin, Rotations, end_joints
 from .segments import Segments
 from .terms import GROUND, Group, One
 
-__all__ = ["SIDES", "body_numbers", "connections_in", "connections_of", "freedoms", "row_of", "stopped_in"]
-
-
-SIDES = ("low", "high")
-"""The two stops of a spring."""
+__all__ = ["body_numbers", "connections_in", "connections_of", "freedoms", "row_of", "stopped_in"]
 
 
 def row_of(table: str, name: str, side: str) -> str:

@@ -25,6 +25,7 @@ from .terms import GROUND
 __all__ = [
     "MOST_COUPLED",
     "SAME_CUT",
+    "SIDES",
     "Segment",
     "Segments",
     "angle_of",
@@ -226,13 +227,17 @@ def pulled_place(scene: Scene, mesh: Mesh, tendon: str) -> str:
     return f"tension of tendons.{tendon}" if record.rubs and taut else ""
 
 
+SIDES = ("low", "high")
+"""The two stops of a spring."""
+
+
 def one_sided(scene: Scene) -> tuple[tuple[str, str, str], ...]:
     """Table, name and side of each unilateral constraint of a scene but its obstacles: strings ``slack``, stops of
     springs ``low`` and ``high``; tendons first, in the order of the scene.
     """
     strings = [("tendons", name, "slack") for name, tendon in scene.tendons.items() if tendon.may_be_slack]
     stopped = [name for name, spring in scene.springs.items() if spring.stop is not None]
-    return (*strings, *(("springs", name, side) for name in stopped for side in ("low", "high")))
+    return (*strings, *(("springs", name, side) for name in stopped for side in SIDES))
 
 
 def switch_of(table: str, name: str, side: str) -> str:

@@ -213,9 +213,7 @@ class EquilibriumSolver:
         if outcome.code not in SOLVED:
             return outcome, nothing
         p, state = np.append(p, outcome.places), outcome.state
-        given = self._called(self.prepare, p)
-        if self.switches is not None:
-            given = self.switches.given(given, self.switches.acting(state))
+        given = self.given(p, state)
         # A stiffness of what is singular is not a number either.
         outputs = self._called(self.output, p, state, given)
         if not np.isfinite(outputs).all():
@@ -223,6 +221,11 @@ class EquilibriumSolver:
         if self.margins is not None and not self._called(self.margins, p, state, given).min(initial=0.0) >= 0.0:
             return replace(outcome, code=Code.TOUCHES, negative=NOT_DEFINED), nothing
         return replace(outcome, error=float(self._called(self.error, state, given)[0])), outputs
+
+    def given(self, p: Array, state: Array) -> Array:
+        """What is given for all numbers (size,), with what acts of strings and stops at an equilibrium (states,)."""
+        given = self._called(self.prepare, p)
+        return given if self.switches is None else self.switches.given(given, self.switches.acting(state))
 
     def _called(self, function: ca.Function, *arguments: Array) -> Array:
         """The result of one of this solver's functions, flat; nan where it cannot be computed."""

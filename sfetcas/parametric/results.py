@@ -21,7 +21,7 @@ from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers, values_of
 from ..mathematics.constants import sparse, times
-from ..mechanics.connections import SIDES, connections_of, row_of
+from ..mechanics.connections import connections_of, row_of
 from ..mechanics.laws import bent_by, law_data, law_of
 from ..mechanics.load_terms import spread_of
 from ..mechanics.magnetism import magnet_terms
@@ -29,7 +29,7 @@ from ..mechanics.mesh import ContactPoint
 from ..mechanics.model import Model
 from ..mechanics.reactions import Reactions
 from ..mechanics.rings import up_to
-from ..mechanics.segments import standing
+from ..mechanics.segments import SIDES, standing
 from ..mechanics.singles import fibre_strain, spin_of, turned_vector
 from ..mechanics.stations import Stations
 from ..mechanics.tendon_chains import part_of

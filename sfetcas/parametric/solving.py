@@ -313,7 +313,7 @@ class ParametricEquilibrium:
         return answer
 
     def _solved(self, numbers: Array, start: ParametricAnswer | None) -> ParametricAnswer:
-        """The equilibrium for numbers, in the choice of the solver."""
+        """The equilibrium for numbers, beginning with an earlier one, from afar, or with statics."""
         near = () if start is None else start.near(numbers)
         outcome = self.solver.found(numbers, *near)
         if outcome.code not in SOLVED and start is not None:
@@ -485,7 +485,7 @@ class ParametricAnswer:
             A stiffness or compliance that was asked for has no value, as the equilibrium is singular.
         """
         solver = self.of.solver
-        given = np.array(solver.prepare(self._whole)).ravel()
+        given = solver.given(self._whole, self.outcome.state)
         try:
             return solver.by_name(np.array(solver.output(self._whole, self.outcome.state, given)).ravel())
         except RuntimeError:

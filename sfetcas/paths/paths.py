@@ -21,10 +21,9 @@ from .. import tolerances
 from ..description.records import enumerated
 from ..description.remembering import refuse_memory
 from ..description.scene import Scene
-from ..equilibria.meshing import Meshing
 from ..equilibria.settings import Settings, settings_with
 from ..equilibria.solution import Equilibrium, equilibrium, touched_notes
-from ..equilibria.statics import solve
+from ..equilibria.statics import pilot_of, solve
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.threads import single_threaded
 from ..mechanics.accuracy import largest_difference
@@ -66,11 +65,6 @@ PATIENCE = 5
 
 LOW = 4
 """Order of elements that is relied on in contact."""
-
-FINE, ORDER = 3e-5, 6
-"""Below this accuracy elements of this order save a halving of the mesh in the plane, where they cost hardly more time
-than those of order 4; not where laws have memory or something rubs, nor where modes are found at each point (measured).
-"""
 
 FEW_ELEMENTS = 16
 """A first mesh of so many elements costs less than to look whether fewer would do."""
@@ -358,13 +352,10 @@ class PathTracing:
         return self._mesh((max(1.5 * min(met), self.span[0]), min(1.5 * max(met), self.span[1])))
 
     def _mesh(self, factors: tuple[float, ...]) -> Mesh:
-        """The mesh that statics begins with at the given factors, of elements of higher order where these gain."""
+        """The mesh that statics begins with at the given factors."""
         steps = tuple(factor for factor in factors if factor) or (self._widest,)
-        scene = self.scene.model_copy(update={"analysis": self.analysis.model_copy(update={"steps": steps})})
-        meshes = Meshing(scene, self.settings)
-        plain = scene.resolved_dimension == "plane" and not self.one_sequence and not self.analysis.count_of_modes
-        gains = plain and self.accuracy < FINE and not meshes.named
-        return replace(meshes.target, order=ORDER) if gains else meshes.target
+        analysis = self.analysis.model_copy(update={"steps": steps})
+        return pilot_of(self.scene.model_copy(update={"analysis": analysis}), self.settings)
 
     def choices(self, mesh: Mesh, unit: float | None = None) -> Choices:
         """The models of a mesh, with the ``unit`` of a path that is known already."""

@@ -3,12 +3,8 @@
     sf_copy(acting, sf_acts, SF_SWITCHES);
     if (warm && sf_all_finite(own, SF_STATE)) sf_acting(own, acting);
     for (rounds = 0; rounds < SF_CHOICES; ++rounds) {
-      status = @NAME@_STALLED;
       sf_switch(m->given, acting);
-      sf_call(m, @name@_row, m->given, 0, 0, row);
-      if (!sf_find(&model, &system, &sf_the_rules, &inputs, row, begins, own, &point, numbers, &sought))
-        status = sought.status;
-      sought.iterations += iterations;
+@once@      sought.iterations += iterations;
       iterations = sought.iterations;
       if (status > @NAME@_UNSTABLE) {
         if (begun == 2 || status == @NAME@_BAD_ARGUMENT) break;
@@ -27,5 +23,4 @@
     if (rounds == SF_CHOICES && status <= @NAME@_UNSTABLE) status = @NAME@_TOUCHES;
     for (i = 0; status <= @NAME@_UNSTABLE && i < SF_SWITCHES; ++i)
       own[acting[i] != 0.0 ? sf_opening_of[i] : sf_multiplier_of[i]] = 0.0;
-    sf_acting(own, acting);
-    sf_switch(m->given, acting);
+    sf_switch_as(m->given, own);

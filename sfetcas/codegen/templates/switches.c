@@ -12,6 +12,12 @@ static void sf_switch(double *given, const double *acting) {
   for (i = 0; i < SF_SWITCHES; ++i) given[sf_flag_of[i]] = acting[i];
 }
 
+static void sf_switch_as(double *given, const double *state) {
+  double acting[SF_SWITCHES];
+  sf_acting(state, acting);
+  sf_switch(given, acting);
+}
+
 /* The constraint that is wrong the most, strings first, what acts first; -1: none. */
 static int sf_worst(@name@_memory *m, const double *state, const double *acting) {
   int i, strings, active;
