@@ -23,4 +23,5 @@
     if (rounds == SF_CHOICES && status <= @NAME@_UNSTABLE) status = @NAME@_TOUCHES;
     for (i = 0; status <= @NAME@_UNSTABLE && i < SF_SWITCHES; ++i)
       own[acting[i] != 0.0 ? sf_opening_of[i] : sf_multiplier_of[i]] = 0.0;
+    /* As a state alone says it: what neither pushes nor is open does not act. */
     sf_switch_as(m->given, own);
