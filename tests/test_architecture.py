@@ -182,6 +182,7 @@ ORDER = [
     "contact.closest",
     "contact.gripping",
     "contact.lines",
+    "contact.spread",
     "contact.edges",
     "contact.passing",
     "contact.member_contact",

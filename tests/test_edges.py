@@ -290,3 +290,15 @@ def test_wrong_input_is_told_in_one_sentence(contact, sentence):
     with pytest.raises(SceneError, match=sentence) as told:
         made(over(contact))
     assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("accuracy", [1e-4, 1e-6])
+def test_what_nothing_holds_without_edges_is_not_led_through_them(accuracy):
+    """A beam that may turn about its middle: a share of the way on which it comes to the edges was taken for its begin
+    where it is beyond them already, so that they were on its other side.
+    """
+    scene = load("problems/knife_edges_middle_pressed_down.toml").replace({"analysis.accuracy": accuracy})
+    last = solve(scene.replace({"analysis.steps": [0.1]})).last
+    # Batista 2015, as in the problem; places are less accurate than positions.
+    assert last.contacts["right_edge"]["at"] == pytest.approx(0.3353290672194, abs=100.0 * accuracy)
+    assert last.position("right_end")[1] > 0.0

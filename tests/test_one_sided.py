@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from test_points_on_obstacles import FLOOR, LARGER, cantilever, smaller
 
-from sfetcas import solve
+from sfetcas import load, solve
 from sfetcas.mathematics import complementarity
-from sfetcas.mathematics.complementarity import by_pivots
+from sfetcas.mathematics.complementarity import by_pivots, needs_none
 from sfetcas.mathematics.core import core, without_core
 from sfetcas.solvers.arclength import Curve, Tangent, bordered
 from sfetcas.solvers.between_states import turned_between
@@ -85,6 +85,30 @@ def test_of_two_solutions_the_one_to_which_the_change_leads_is_found():
     np.testing.assert_allclose(by_pivots(matrix, given), [1.0, 2.0], rtol=1e-14)
     # From where both gaps are open the first force grows by s, and leaves 1 - 2 s + 3 s of the other gap.
     np.testing.assert_allclose(by_pivots(matrix, given, np.array([0.0, 1.0])), [1.0, 0.0], rtol=1e-14)
+
+
+def test_where_nothing_is_wrong_but_by_rounding_the_matrix_does_not_matter():
+    """A push of rounding, however small, would be one more row that acts."""
+    for given in ([1.0, 0.0], [1.0, -1e-15], [0.0, 0.0]):
+        assert needs_none(np.array(given))
+        np.testing.assert_array_equal(by_pivots(np.eye(2), np.array(given), np.ones(2)), [0.0, 0.0])
+    assert not needs_none(np.array([1.0, -1e-9]))
+
+
+def test_what_each_row_would_change_is_found_only_where_rows_change(monkeypatch):
+    """A column each of them: on long lines most of what a step costs."""
+    columns = list[bool]()
+    moved = OneSided._moved
+
+    def counted(self, point, slope, *, every=False):
+        columns.append(every)
+        return moved(self, point, slope, every=every)
+
+    monkeypatch.setattr(OneSided, "_moved", counted)
+    solve(load("problems/cable_dragged_over_sea_bed.toml"))
+    # Where it slides no place begins or ceases to touch: all of it lies there from the begin.
+    assert columns.count(False) > 50
+    assert sum(columns) < 0.1 * len(columns)
 
 
 def test_what_has_no_solution_is_told():

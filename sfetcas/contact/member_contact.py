@@ -42,6 +42,7 @@ from .gripping import CENTRED, FIRM, Gripping, Placed
 from .lines import LINE, SHORT_LINE, Lines, Points, begun, ends_of, points_of
 from .pairs import ONE, Near, Pair, PairKey, penetrating
 from .passing import Passing, tangents_turned
+from .spread import Numbers, Spread
 
 __all__ = ["FITS", "LESS", "MORE", "STRIDE", "MemberContact", "Way"]
 
@@ -554,8 +555,7 @@ class MemberContact:
         target, before = prepared.model, source.model
         state = transferred(before, source.state, target)
         y, lam = state.y.copy(), np.zeros_like(state.lam)
-        numbers, had = ({name: i for i, name in enumerate(m.positions.unknowns)} for m in (target, before))
-        known = {name: i for i, name in reversed(list(enumerate(before.row_names)))}
+        mine, its, spread = Numbers(target), Numbers(before), Spread(source)
         # Points have other numbers than before: rows of points by what they are, all others by their names.
         others = [i for i, name in enumerate(target.row_names) if not name.startswith("contacts.")]
         lam[others] = state.lam[others]
@@ -563,7 +563,6 @@ class MemberContact:
             # Segments end where points are.
             closing, forces = source.fields.carried_to(target)
             lam[closing] = forces
-        rows = {name: i for i, name in reversed(list(enumerate(target.row_names)))}
         unit, axes = target.scales.length, target.element.axes
         # Those that continue are where the points of the state are now, those that have slid beyond an end there.
         formers = {p.key: former for p, former in zip(points_of(source), before.mesh.points, strict=True)}
@@ -572,7 +571,7 @@ class MemberContact:
             Placed(self.scene, source.fields, single).vectors, undeformed_vectors(self.scene, single), strict=True
         )
         apart = {point.name: both for point, both in zip(single, vectors, strict=True)}
-        self._displaced(y, numbers, target, source.fields)
+        self._displaced(y, mine.unknowns, target, source.fields)
         for point in target.mesh.points:
             turn = source.fields.motion_of(point.contact)
             if point.line:
@@ -583,30 +582,38 @@ class MemberContact:
                 change = ((now if turn is None else turn[0] @ now) - begun)[:axes] / unit
             names = ("across", "along", "along too") if point.line else "xyz"
             for k, moved in enumerate(change.tolist()):
-                y[numbers[f"{point.between}, {names[k]}"]] = moved
+                y[mine.unknowns[f"{point.between}, {names[k]}"]] = moved
             for side, free in enumerate(point.slides):
                 if free:
-                    y[numbers[f"{point.place(side)}, arc length"]] = 0.0
+                    y[mine.unknowns[f"{point.place(side)}, arc length"]] = 0.0
             former = formers.get(point.key)
-            if former is not None and not point.new:
+            going_on = spread.of(target.mesh, point) if point.line and (former is None or former.line) else None
+            count = len(mine.multipliers(point))
+            if point.new:
+                continue
+            force = np.zeros(0)
+            if going_on is not None and len(going_on) == count + len(mine.forces(point)):
+                lam[mine.multipliers(point)], force = going_on[:count], going_on[count:]
+            elif former is not None:
                 # Of what has become a line, or ceases to be one, the push alone goes on.
                 same = former.line == point.line
-                had_rows = {row.removeprefix(former.name): known[row] for row in former.rows(axes)}
+                had_rows = {row.removeprefix(former.name): its.rows[row] for row in former.rows(axes)}
                 for row in point.rows(axes):
                     what = row.removeprefix(point.name)
                     if what in had_rows and (same or what.endswith("gap")):
-                        lam[rows[row]] = source.state.lam[had_rows[what]]
+                        lam[mine.rows[row]] = source.state.lam[had_rows[what]]
                 if point.grip is not None and former.grip is not None:
-                    shares = ("across", "along", "along too")[:axes]
-                    force = source.state.y[[had[f"{former.pressed}, {share}"] for share in shares]]
-                    y[[numbers[f"{point.pressed}, {share}"] for share in shares]] = force
-                    rubs = float(np.linalg.norm(force[1:]))
-                    if rubs >= (1.0 - SLIPPED) * point.grip.coefficient * force[0] > 0.0:
-                        # What has slid slides on.
-                        way = force[1:] if point.line else np.array(point.grip.frame).T @ force[1:]
-                        way = way if point.line or turn is None else turn[0] @ way
-                        parts = names[1:axes] if point.line else names[:axes]
-                        y[[numbers[f"{point.between}, {name}"] for name in parts]] -= SLIPPED * way[: len(parts)] / rubs
+                    force = source.state.y[its.forces(former)]
+            if len(force) and point.grip is not None:
+                y[mine.forces(point)] = force
+                rubs = float(np.linalg.norm(force[1:]))
+                if rubs >= (1.0 - SLIPPED) * point.grip.coefficient * force[0] > 0.0:
+                    # What has slid slides on.
+                    way = force[1:] if point.line else np.array(point.grip.frame).T @ force[1:]
+                    way = way if point.line or turn is None else turn[0] @ way
+                    parts = names[1:axes] if point.line else names[:axes]
+                    slipped = [mine.unknowns[f"{point.between}, {name}"] for name in parts]
+                    y[slipped] -= SLIPPED * way[: len(parts)] / rubs
         return replace(state, y=y, lam=lam)
 
     @staticmethod
@@ -1090,16 +1097,25 @@ class MemberContact:
             found = there
         return found
 
-    def ended(self, found: Solved, way: Way) -> Solved:
-        """The state at the end of a way with friction with the places where lines end for unknowns, if it is found."""
-        keys, self.lines.ending = self.lines.keys, self.lines.ends_within(found)
+    @property
+    def begun(self) -> tuple[Fields | None, frozenset[PairKey]]:
+        """The state from which slip is measured, and the lines: what :meth:`ended` needs to know of the last step."""
+        return self.gripping.since, self.lines.keys
+
+    def ended(self, found: Solved, way: Way, begun: tuple[Fields | None, frozenset[PairKey]]) -> Solved:
+        """The state at the end of a way with friction with the places where lines end for unknowns, if it is found.
+
+        ``begun`` is what :attr:`begun` was there.
+        """
+        self.gripping.since, self.lines.keys = begun
+        self.lines.ending = self.lines.ends_within(found)
         if not self.lines.ending:
             return found
         points = self.lines.by_element(points_of(found))
         there = self.resolved(replace(found.model.mesh, points=()), points, found, way)
         near = there is not None and tangents_turned(found.fields, there.fields) < STRIDE
         there = self.fitted(there, way) if there is not None and near else found
-        self.lines.keys, self.lines.ending = keys, frozenset()
+        self.lines.ending = frozenset()
         return there
 
     def as_lines(self, found: Solved, way: Way, turned: float) -> Solved | None:

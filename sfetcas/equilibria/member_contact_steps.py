@@ -149,8 +149,10 @@ class MemberContactSteps:
 
     def _alone(self, pilot: Prepared, factor: float, zero: Solved) -> Equilibrium | None:
         """The answer in which nothing touches, where the growing loads lead there; else None."""
-        # What has no place without loads may be led through other members before they are looked at.
-        if (pilot.lacks_slack or pilot.diagnosis.mobility) and self._begun(pilot, factor, zero) is None:
+        # What has no place without loads is led past what it may touch from where it can have come to.
+        loose = pilot.lacks_slack or pilot.diagnosis.mobility > 0
+        bent = self._begun(pilot, factor, zero) if loose else None
+        if loose and bent is None:
             return None
         if pilot.model.mesh.stops:
             # A stop that is held all along is where it is at once.
@@ -158,7 +160,7 @@ class MemberContactSteps:
             if not (held.converged and self.run.unstopped(zero, held)):
                 return None
         try:
-            found = self.ways.grown_from_zero(pilot, factor, self.run.unstopped)
+            found = self.ways.grown_from_zero(pilot, factor, self.run.unstopped, bent)
         except SolveError as error:
             if error.status in LIMITS:
                 raise

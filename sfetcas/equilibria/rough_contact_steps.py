@@ -8,10 +8,12 @@ the length, until two sequences agree.
 from __future__ import annotations
 
 import contextlib
+import functools
 import itertools
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 from ..contact.held_inside import refuse_held_inside
 from ..contact.member_contact import MemberContact
@@ -32,14 +34,47 @@ __all__ = ["RoughContactSteps", "lost_while"]
 LEVELS = 6
 """Sequences at most."""
 
-PLAIN = 1
-"""Sequences before it is also solved for where lines end: a low accuracy does not need it."""
+ROUGHLY = 1e-4
+"""Least accuracy that the first sequence takes, a tenth of it in each further one: what lies along something round on a
+coarse mesh cannot but be inside of it somewhere.
+"""
 
 NEARLY = 0.99
 """Share of the limit of friction from which on what touches is said to be about to slide."""
 
+FINER = "a finer sequence of steps, which the accuracy asks for, was lost"
+"""The begin of a note."""
+
 ORDER_MATTERS = "with friction: what slides depends on the order of the steps"
 """A note."""
+
+
+@dataclass
+class _Sequence:
+    """The states of steps, one after the other.
+
+    Attributes
+    ----------
+    run : MemberContact
+    steps : sequence of float
+        The factors.
+    found : list of Solved
+    begun : list
+        What :attr:`.MemberContact.begun` is at each.
+    notes : list of tuple of str
+    """
+
+    run: MemberContact
+    steps: Sequence[float]
+    found: list[Solved] = field(default_factory=list)
+    begun: list[Any] = field(default_factory=list)
+    notes: list[tuple[str, ...]] = field(default_factory=list)
+
+    @functools.cached_property
+    def ended(self) -> list[Solved]:
+        """The states with the places where lines end for unknowns, where that is found."""
+        each = zip(self.found, self.steps, self.begun, strict=True)
+        return [self.run.ended(found, on_way(factor, factor, 1.0), begun) for found, factor, begun in each]
 
 
 class RoughContactSteps:
@@ -80,30 +115,43 @@ class RoughContactSteps:
     def _answers(self, pilot: Prepared, steps: Sequence[float]) -> list[Equilibrium]:
         target = self.meshes.target
         mesh = target if self.meshes.fixed else replace(pilot.model.mesh, order=target.order)
-        before: list[Solved] = []
-        errors: Sequence[float] = ()
+        before: _Sequence | None = None
+        judged: tuple[Sequence[Solved], Sequence[float], Sequence[tuple[str, ...]]] | None = None
         for level in range(LEVELS):
-            now, run, notes = self._sequence(mesh, level, steps)
-            if before:
-                # Of first order where what slides is decided: what is left is not less than what the halving changed.
-                judged = [self.meshes.judged(unjudged(a), unjudged(b)) for a, b in zip(before, now, strict=True)]
-                deep = [run.penetration(one.fields) / self.scene.size for one in now]
-                errors = [max(*pair, depth) for pair, depth in zip(judged, deep, strict=True)]
-                kept = before if self.meshes.prescribed else now
-                if self.meshes.prescribed or max(errors) <= self.meshes.accuracy or self._large(now):
-                    return [self._answer(*each) for each in zip(kept, errors, notes, strict=True)]
+            try:
+                now = self._sequence(mesh, level, steps)
+            except SolveError as error:
+                if judged is None:
+                    raise
+                # Two sequences that agree by less are an answer as well, though not to the accuracy.
+                self.failed, lost = (0.0, []), f"{FINER}: {error.detail}"
+                judged = (*judged[:2], [(*notes, lost) for notes in judged[2]])
+                break
+            if before is not None:
+                errors = self._errors(now.run, before.found, now.found)
+                kept = before.found if self.meshes.prescribed else now.found
+                if not self.meshes.prescribed and max(errors) > self.meshes.accuracy:
+                    # Where lines end is solved for only where the accuracy needs it.
+                    kept, errors = now.ended, self._errors(now.run, before.ended, now.ended)
+                judged, large = (kept, errors, now.notes), now.found[-1].model.mesh.elements > MOST_ELEMENTS
+                if self.meshes.prescribed or max(errors) <= self.meshes.accuracy or large:
+                    break
             before, mesh = now, mesh.refined()
-        return [self._answer(*each) for each in zip(before, errors, notes, strict=True)]
+        assert judged is not None
+        return [self._answer(*each) for each in zip(*judged, strict=True)]
 
-    @staticmethod
-    def _large(found: Sequence[Solved]) -> bool:
-        return found[-1].model.mesh.elements > MOST_ELEMENTS
+    def _errors(self, run: MemberContact, coarse: Sequence[Solved], fine: Sequence[Solved]) -> list[float]:
+        """Estimated errors of states: of first order where what slides is decided, so that what is left is not less
+        than what the halving changed; and how deep members are in what they touch.
+        """
+        judged = (self.meshes.judged(unjudged(a), unjudged(b)) for a, b in zip(coarse, fine, strict=True))
+        deep = (run.penetration(one.fields) / self.scene.size for one in fine)
+        return [max(*pair, depth) for pair, depth in zip(judged, deep, strict=True)]
 
-    def _sequence(
-        self, mesh: Mesh, level: int, steps: Sequence[float]
-    ) -> tuple[list[Solved], MemberContact, list[tuple[str, ...]]]:
-        """The states of steps, followed from the undeformed scene, and notes on each."""
-        run = MemberContact(self.scene, self.meshes.prepared, self.meshes.accuracy, self.meshes.fixed)
+    def _sequence(self, mesh: Mesh, level: int, steps: Sequence[float]) -> _Sequence:
+        """The states of steps, followed from the undeformed scene."""
+        accuracy = max(self.meshes.accuracy, ROUGHLY * 0.1**level)
+        run = MemberContact(self.scene, self.meshes.prepared, accuracy, self.meshes.fixed)
         run.stride, run.first = run.stride * 0.5**level, run.first * 0.5**level
         run.rough, run.lines.finer = run.rough * 0.1**level, 0.5**level
         prepared = self.meshes.prepared(mesh)
@@ -111,7 +159,7 @@ class RoughContactSteps:
         run.redundant = redundant(prepared.equations, zero.point)
         run.refuse_penetrating(zero.fields)
         now, last = run.lying(zero), 0.0
-        found, notes = list[Solved](), list[tuple[str, ...]]()
+        sequence = _Sequence(run, steps)
         self.failed, self._done = (0.0, []), 0
         if self.scene.histories:
             now = self._known(run, run.follow(lambda t: lambda model: model.loading(0.0, t), now), 0.0, 0.0)
@@ -122,10 +170,11 @@ class RoughContactSteps:
             for a, b in itertools.pairwise(stops_between(self.scene, last, factor)):
                 now = self._known(run, run.follow(partial(on_way, a, b), now), a, b)
                 told += run.notes(a, b)
-            found.append(now if level <= PLAIN else run.ended(now, on_way(factor, factor, 1.0)))
-            notes.append(told)
+            sequence.found.append(now)
+            sequence.begun.append(run.begun)
+            sequence.notes.append(told)
             last = factor
-        return found, run, notes
+        return sequence
 
     def _known(self, run: MemberContact, found: Solved | None, begin: float, end: float) -> Solved:
         """The state at the end of a way.

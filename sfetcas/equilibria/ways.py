@@ -293,9 +293,12 @@ class Ways:
         return self._through(pilot, last[0], factor, last[1].solved.state)
 
     def grown_from_zero(
-        self, pilot: Prepared, factor: float, allowed: Allowed | None = None
+        self, pilot: Prepared, factor: float, allowed: Allowed | None = None, bent: Solved | None = None
     ) -> EquilibriumResult | None:
-        """The state that the loads lead to from zero, by steps that ``allowed`` accepts; None where that fails."""
+        """The state that the loads lead to from zero, by steps that ``allowed`` accepts; None where that fails.
+
+        What has no place of its own without loads begins at ``bent``, by default at that of :meth:`bent`.
+        """
         model = pilot.model
         zero = self._unloaded(pilot)
         if pilot.lacks_slack:
@@ -304,10 +307,10 @@ class Ways:
                 found = self._through(pilot, 0.0, factor, zero, allowed)
                 # What cannot bend leaves for a whole turn within one element, which only its mesh lets pass.
                 return None if found is None or found.solved.multipliers > BEYOND else found
-            return None if self.scene.histories else self._grown_from_bent(pilot, factor, allowed)
+            return None if self.scene.histories else self._grown_from_bent(pilot, factor, allowed, bent)
         if pilot.model.minimisable and pilot.diagnosis.mobility and not self.scene.histories:
             # A mechanism has no place of its own without loads: the way begins where a small share of them puts it.
-            return self._grown_from_bent(pilot, factor, allowed)
+            return self._grown_from_bent(pilot, factor, allowed, bent)
         if model.loaded_at_zero:
             # Then the way leads through the factors, after the loads of factor 0 have grown.
             first = self._followed(pilot, lambda t: model.loading(0.0, t), zero, None, allowed)
@@ -347,9 +350,11 @@ class Ways:
             found, state = replace(part, notes=(*(found.notes if found else ()), *part.notes)), part.solved.state
         return found
 
-    def _grown_from_bent(self, pilot: Prepared, factor: float, allowed: Allowed | None) -> EquilibriumResult | None:
+    def _grown_from_bent(
+        self, pilot: Prepared, factor: float, allowed: Allowed | None, bent: Solved | None
+    ) -> EquilibriumResult | None:
         """As :meth:`grown_from_zero`, from where a small share of the loads moves the structure to."""
-        bent = self.bent(pilot, factor)
+        bent = bent or self.bent(pilot, factor)
         if bent is None:
             return None
         begin, state = bent.factor, bent.state

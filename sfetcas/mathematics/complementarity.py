@@ -36,7 +36,7 @@ import numpy as np
 from .arrays import TINY, Array, Index, Sparse
 from .core import core, doubles, integers
 
-__all__ = ["Friction", "by_pivots", "complementary"]
+__all__ = ["Friction", "by_pivots", "complementary", "needs_none"]
 
 YIELDING = 1e-9
 """Diagonal that is added, over the one that is there."""
@@ -154,6 +154,11 @@ def _smooth(matrix: Sparse, b: Array, begin: Array, least: float) -> Array | Non
     return _from_inside(matrix, b, least) if x is None else x
 
 
+def needs_none(b: Array) -> bool:
+    """Whether zero is the solution, whatever the matrix: nothing of ``b`` (n,) is below it by more than rounding."""
+    return bool((b >= -ROUNDING * np.abs(b).max(initial=0.0)).all())
+
+
 def by_pivots(matrix: Array, b: Array, begin: Array | None = None) -> Array | None:
     """The solution x (n,) of a problem with a dense matrix (n, n); None where pivots lead to none that is accurate.
 
@@ -165,6 +170,8 @@ def by_pivots(matrix: Array, b: Array, begin: Array | None = None) -> Array | No
     >>> by_pivots(np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-2.0, 1.0])).tolist()
     [1.0, 0.0]
     """
+    if needs_none(b):
+        return np.zeros(len(b))
     try:
         x = None if begin is None else _judged(matrix, b, _by_single_pivots(matrix, b, begin - b, ALONG))
         return _by_blocks(matrix, b) if x is None else x

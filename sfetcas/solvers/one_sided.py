@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import tolerances
 from ..mathematics.arrays import Array, Index
-from ..mathematics.complementarity import by_pivots
+from ..mathematics.complementarity import by_pivots, needs_none
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
 from .newton import AtLoads, Balance
@@ -123,16 +123,16 @@ class OneSided(AtLoads):
         slope = np.zeros(equations.total)
         if self.border is not None:
             slope = self.border.slope(here.state, here.loading.factor, point)
-        moved, factor = self._moved(point, rows, slope)
-        # Pushes of rows that act, gaps of those that do not.
-        gaps = _times(equations, point.entries, moved, rows) + np.outer(slope[rows], factor)
-        gaps[:, 0] += point.residual[rows]
-        gaps, pushes = -signs[:, None] * gaps, signs[:, None] * moved[rows]
-        pushes[:, 0] += forces
-        basic = np.where(self.acting[:, None], pushes, gaps)
-        now = np.maximum(np.where(self.acting, forces, -signs * point.residual[rows]), 0.0)
-        # Where pushes are unknowns what slips changes with them, which is not part of the choice of rows.
-        found = by_pivots(basic[:, 1:], basic[:, 0], now if (signs < 0.0).all() else None)
+        moved, factor = self._moved(point, slope)
+        first = self._basic(here.state, point, moved, slope, factor)
+        found: Array | None = np.zeros(len(rows))
+        if not needs_none(first[:, 0]):
+            # Only where another choice is to be made it matters what each row would change.
+            moved, factor = self._moved(point, slope, every=True)
+            basic = self._basic(here.state, point, moved, slope, factor)
+            now = np.maximum(np.where(self.acting, forces, -signs * point.residual[rows]), 0.0)
+            # Where pushes are unknowns what slips changes with them, which is not part of the choice of rows.
+            found = by_pivots(basic[:, 1:], basic[:, 0], now if (signs < 0.0).all() else None)
         if found is not None:
             self.acting[found > 0.0] ^= True
         near = here.residual <= AGAIN
@@ -142,7 +142,7 @@ class OneSided(AtLoads):
             raise np.linalg.LinAlgError("again and again no choice of rows is right")
         if found is None:
             return self._with_factor(moved[:, 0], factor[0])
-        shares = np.append(1.0, found)
+        shares = np.append(1.0, found)[: moved.shape[1]]
         step = moved @ shares
         step[rows[~self.acting]] = -(signs * forces)[~self.acting]
         return self._with_factor(step, factor @ shares)
@@ -151,11 +151,20 @@ class OneSided(AtLoads):
         step = self._without_flat(step)
         return step if self.border is None else np.append(step, factor)
 
-    def _moved(self, point: Point, rows: Index, slope: Array) -> tuple[Array, Array]:
-        """Newton's step with the rows that act, and what a push of each other row, or a gap of each of these, changes:
-        columns (total, 1 + m), and the change of the factor with each (1 + m,).
+    def _basic(self, state: State, point: Point, moved: Array, slope: Array, factor: Array) -> Array:
+        """Pushes of rows that act, and gaps of those that do not, after each of the steps of :meth:`_moved`: (m, k)."""
+        rows, signs = self.pushing, self._signs
+        gaps = _times(self.equations, point.entries, moved, rows) + np.outer(slope[rows], factor)
+        gaps[:, 0] += point.residual[rows]
+        gaps, pushes = -signs[:, None] * gaps, signs[:, None] * moved[rows]
+        pushes[:, 0] += self.pushes(state)
+        return np.where(self.acting[:, None], pushes, gaps)
+
+    def _moved(self, point: Point, slope: Array, *, every: bool = False) -> tuple[Array, Array]:
+        """Newton's step with the rows that act, and with ``every`` what a push of each other row, or a gap of each of
+        these, changes: columns (total, 1 + m), and the change of the factor with each (1 + m,).
         """
-        equations = self.equations
+        equations, rows = self.equations, self.pushing
         idle = np.zeros(equations.total, bool)
         idle[rows[~self.acting]] = True
         entries = np.where(idle[equations.row] | idle[equations.column], 0.0, point.entries)
@@ -164,14 +173,15 @@ class OneSided(AtLoads):
         entries[kept[equations.row]] = 0.0
         entries[equations.diagonal[np.append(rows[~self.acting], self.still)]] = -1.0
         equations.solver.factor(equations.regularised(entries, tolerances.PROXIMAL * self.weight, tolerances.DUAL))
-        right = np.zeros((equations.total, 2 + len(rows)))
+        right = np.zeros((equations.total, 2 + every * len(rows)))
         right[:, 0], right[:, -1] = np.where(idle, 0.0, -point.residual), np.where(idle, 0.0, -slope)
-        number = np.zeros(equations.total, np.intp)
-        number[rows] = np.arange(1, len(rows) + 1)
-        right[rows[self.acting], number[rows[self.acting]]] = -self._signs[self.acting]
-        mine = idle[equations.column] & ~(idle | kept)[equations.row]
-        column = number[equations.column[mine]]
-        right[equations.row[mine], column] = -self._signs[column - 1] * point.entries[mine]
+        if every:
+            number = np.zeros(equations.total, np.intp)
+            number[rows] = np.arange(1, len(rows) + 1)
+            right[rows[self.acting], number[rows[self.acting]]] = -self._signs[self.acting]
+            mine = idle[equations.column] & ~(idle | kept)[equations.row]
+            column = number[equations.column[mine]]
+            right[equations.row[mine], column] = -self._signs[column - 1] * point.entries[mine]
         moved = equations.solver.solve(right)
         moved, rate = moved[:, :-1], moved[:, -1]
         if self.border is None:
