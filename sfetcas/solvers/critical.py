@@ -164,13 +164,41 @@ def _settled(
     left, right = at(place - reach), at(place + reach)
     if left is None or right is None or not _connected(curve, a, (left, found, right), value):
         return None
+    parted = abs(value(found)) > BLURRED * BLUR
+    if parted:
+        # Where an imperfection parts the curve from the one that crosses it, no point is near enough.
+        place = _vanishes(at, place, reach, value)
+        left, right = at(place - reach), at(place + reach)
+        if left is None or right is None:
+            return None
+        found = replace(found, arc=a.arc + place)
     tangent = _mean(curve, left, right)
     # Positions between the two points are measured along the tangent of a, as in the search for the point.
     left, right = (replace(s, tangent=_per_way(s.tangent, curve.inner(s.tangent, a.tangent))) for s in (left, right))
     state, factor = curve.predicted(left, reach, curve.bend(left, right))
     settled = curve.corrected(state, factor, a.tangent, found.arc, primal_factor=LARGEST_PRIMAL_FACTOR)
+    if parted:
+        # What is between the two curves is an equilibrium but for the imperfection.
+        found = curve.standing(state, factor, tangent, arc=found.arc)
     close = settled is not None and curve.prepared.distance(settled.state, found.state) < SETTLED
     return replace(settled if settled is not None and close else found, tangent=tangent)
+
+
+def _vanishes(
+    at: Callable[[float], Standing | None], place: float, reach: float, value: Callable[[Standing], float]
+) -> float:
+    """Where an eigenvalue vanishes beside a place, as points to both sides of it say; the place itself where these are
+    none, or too far from it.
+    """
+    ways = reach * np.array([-2.0, -1.0, 1.0, 2.0])
+    points = [at(place + way) for way in ways.tolist()]
+    values = np.array([np.nan if point is None else value(point) for point in points])
+    if not np.isfinite(values).all():
+        return place
+    cubic = np.polynomial.Polynomial.fit(ways, values, 3)
+    roots = cubic.roots()
+    near = roots[(np.abs(roots.imag) < SHARP * reach) & (np.abs(roots.real) <= reach)].real
+    return place + float(near[np.argmin(np.abs(near))]) if len(near) else place
 
 
 def _connected(
