@@ -1,5 +1,6 @@
 """Coulomb friction where members touch, in statics along the order of the steps."""
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from runpy import run_path
@@ -13,6 +14,7 @@ from sfetcas import Scene, SceneError, SolveError, cli, dump, load, solve
 from sfetcas.contact.gripping import CENTRED
 from sfetcas.contact.member_contact import MemberContact
 from sfetcas.contact.spread import Numbers, Spread
+from sfetcas.equilibria import rough_contact_steps
 from sfetcas.equilibria.rough_contact_steps import RoughContactSteps
 from sfetcas.equilibria.single import solved_from
 from sfetcas.errors import Status
@@ -658,6 +660,62 @@ def test_where_a_line_leaves_a_rough_bed_is_found_with_what_rubs_there():
     # By collocation to 1e-10, printed with nine digits: without the end as an unknown 1e-4 is left.
     assert step.position("far")[0] == pytest.approx(1.18984925, abs=5e-9)
     assert step.position("far")[1] == pytest.approx(0.0, abs=1e-8)
+
+
+def hanging_from_a_bed(drawn, weight, friction):
+    """A line of 2 m and 0.1 N m^2 that lies from 0 to 2 m, drawn up at its end: where its other end is, and the force.
+
+    Where it leaves the bed, at ``s``, that presses with ``push``, as it is not curved there; all that lies slides.
+    """
+
+    def hangs(unknown):
+        s, push = unknown
+        pull = friction * (weight * s + push)
+
+        def change(at, u):
+            across = weight * (at - s) - push
+            return [np.cos(u[2]), np.sin(u[2]), u[3], (pull * np.sin(u[2]) - across * np.cos(u[2])) / 0.1]
+
+        end = solve_ivp(change, (s, 2.0), [0.0, 0.0, 0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        return end, [pull, weight * (2.0 - s) - push]
+
+    # Where a long line hangs the force is the weight of its boundary layer; other roots have loops.
+    layer = weight * np.sqrt(0.1 / (friction * weight * 1.15))
+    for begin in np.linspace(0.9, 1.1, 9):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            s, push = fsolve(lambda z: hangs(z)[0][[1, 3]] - [drawn[1], 0.0], [begin, 0.97 * layer], xtol=1e-13)
+        end, force = hangs((s, push))
+        if abs(end[1] - drawn[1]) < 1e-10 and 0.0 < end[2] < 0.5 * np.pi and s > 0.9:
+            return 2.0 + drawn[0] - s - end[0], force
+    raise AssertionError("no root without a loop")
+
+
+@pytest.mark.parametrize(
+    ("drawn", "weight", "friction"),
+    [
+        ((1.0, 0.5), 10.0, 0.5),
+        # Where it leaves the bed it went on and off it on the first meshes, and on those with an end there.
+        ((0.9163105234727026, 0.4581552617363513), 8.1479435563432, 0.542090789714828),
+        ((0.9818398272738323, 0.49091991363691617), 11.96621556292265, 0.41983747506922375),
+    ],
+)
+def test_a_line_is_drawn_off_a_rough_bed(drawn, weight, friction, monkeypatch):
+    # Of first order, without the end as an unknown, six do not suffice.
+    monkeypatch.setattr(rough_contact_steps, "LEVELS", 3)
+    far, force = hanging_from_a_bed(drawn, weight, friction)
+    scene = load("problems/catenary_on_a_rough_sea_bed.toml")
+    changes = {
+        "motions.drawn.displacement": drawn,
+        "loads.weight.value": [0.0, -weight],
+        "contacts.bed.friction": friction,
+        "expect": (),
+    }
+    found = solve(scene.replace(changes))
+    assert found.status is Status.SOLVED
+    # The accuracy asked for, 1e-5, times the size of 2 m, and its weight.
+    np.testing.assert_allclose(found.last.position("far")[:2], [far, 0.0], atol=2e-5)
+    np.testing.assert_allclose(found.last.reaction("top")[0][:2], force, atol=2e-5 * weight)
 
 
 def test_forces_along_a_line_are_the_same_on_any_mesh():

@@ -29,6 +29,7 @@ from .pairs import ONE, SAME, Near, Pair, PairKey
 __all__ = [
     "LINE",
     "SHORT_LINE",
+    "SLIVER",
     "Lines",
     "Points",
     "begun",
@@ -564,18 +565,21 @@ class Lines:
             points = (*points, *(p for p in laid if (p.at[0], p.sides) not in known))
         return points
 
-    def fitted(self, mesh: Mesh, points: Points, *, prescribed: bool = False) -> tuple[Mesh, Points]:
+    def fitted(
+        self, mesh: Mesh, points: Points, *, prescribed: bool = False, sliver: float = SLIVER
+    ) -> tuple[Mesh, Points]:
         """A mesh whose elements end where points slide, as members bend otherwise to both sides of a force, and points.
 
-        An end of elements that is near is moved there, and what presses there with it, else there is one more; never in
-        a ``prescribed`` mesh, of which the nearest is moved.
+        An end of elements that is near, by a share ``sliver`` of an element, is moved there, and what presses there
+        with it, else there is one more; never in a ``prescribed`` mesh, of which the nearest is moved.
         """
         cuts, moved = dict(mesh.cuts), dict[tuple[str, float], float]()
         for point in points:
             for member, x, free in zip(point.members, point.at, point.slides, strict=True):
                 if free and 0.0 < x < 1.0 and not self.closest.stiff(member):
                     before = cuts[member]
-                    cuts[member] = after = self._with_end(before, member, x, prescribed or member in self.fixed)
+                    keeps = prescribed or member in self.fixed
+                    cuts[member] = after = self._with_end(before, member, x, keeps, sliver)
                     if len(after) == len(before):
                         moved |= {(member, float(before[i])): x for i in np.flatnonzero(after != before)}
         kept = tuple(
@@ -593,13 +597,13 @@ class Lines:
                     most = max(most, off * self.closest.lengths[member])
         return most / self.scene.size
 
-    def _with_end(self, cuts: Array, member: str, x: float, keeps: bool) -> Array:
+    def _with_end(self, cuts: Array, member: str, x: float, keeps: bool, sliver: float) -> Array:
         """Ends of elements of a member with one at a place; as many as before if it ``keeps`` their number."""
         near, e = int(np.argmin(np.abs(cuts - x))), int(np.searchsorted(cuts, x))
         if abs(cuts[near] - x) < SAME_CUT:
             return cuts
         moves = np.abs(breaks_of(self.scene, member) - cuts[near]).min() > SAME_CUT
-        if moves and (keeps or abs(cuts[near] - x) < SLIVER * (cuts[e] - cuts[e - 1])):
+        if moves and (keeps or abs(cuts[near] - x) < sliver * (cuts[e] - cuts[e - 1])):
             return np.where(np.arange(len(cuts)) == near, x, cuts)
         # Where another member goes on a line does, too.
         goes_on = [float(end) for end, node in enumerate(self.scene.members[member].nodes) if self._shares(node)]

@@ -39,7 +39,7 @@ from ..solvers.pseudo_transient import Drag
 from .closest import Closest
 from .edges import Edges
 from .gripping import CENTRED, FIRM, Gripping, Placed
-from .lines import LINE, SHORT_LINE, Lines, Points, begun, ends_of, points_of
+from .lines import LINE, SHORT_LINE, SLIVER, Lines, Points, begun, ends_of, points_of
 from .pairs import ONE, Near, Pair, PairKey, penetrating
 from .passing import Passing, tangents_turned
 from .spread import Numbers, Spread
@@ -92,6 +92,9 @@ TOUCHED = 4e-5
 
 SUDDEN = 3.0
 """How many times faster than in the step before what is followed may turn, where it turns by a little at all."""
+
+ENOUGH = 64
+"""Elements up to which all are halved where it is not found where lines end, which takes the square of their number."""
 
 FITS = 3
 """Times that elements are made to end where points slide, at most: each time these move by a small share of that."""
@@ -1088,11 +1091,16 @@ class MemberContact:
         for _ in range(times):
             if self.lines.off_ends(found) < self.accuracy:
                 break
-            mesh, points = self.lines.fitted(found.model.mesh, points_of(found), prescribed=prescribed)
-            if mesh.same(replace(found.model.mesh, points=())):
-                break
-            there = self.resolved(mesh, points, found, way)
-            if there is None or tangents_turned(found.fields, there.fields) > STRIDE:
+            there, points = None, points_of(found)
+            for sliver in (SLIVER, 0.0):
+                mesh, fitted = self.lines.fitted(found.model.mesh, points, prescribed=prescribed, sliver=sliver)
+                if there is None and not mesh.same(replace(found.model.mesh, points=())):
+                    there = self.resolved(mesh, fitted, found, way)
+                # What has become longer may not have the place that slides.
+                lost = there is not None and self.lines.ends_slide(points) > self.lines.ends_slide(points_of(there))
+                if lost or (there is not None and tangents_turned(found.fields, there.fields) > STRIDE):
+                    there = None
+            if there is None:
                 break
             found = there
         return found
@@ -1111,12 +1119,21 @@ class MemberContact:
         self.lines.ending = self.lines.ends_within(found)
         if not self.lines.ending:
             return found
-        points = self.lines.by_element(points_of(found))
-        there = self.resolved(replace(found.model.mesh, points=()), points, found, way)
-        near = there is not None and tangents_turned(found.fields, there.fields) < STRIDE
-        there = self.fitted(there, way) if there is not None and near else found
+        mesh, points, best = replace(found.model.mesh, points=()), points_of(found), found
+        while True:
+            there = self.resolved(mesh, self.lines.by_element(points), found, way)
+            if there is not None and tangents_turned(found.fields, there.fields) < STRIDE:
+                if self.lines.ends_slide(points_of(there)):
+                    best = self.fitted(there, way)
+                    break
+                best = there if best is found else best
+            mesh = mesh.refined({name: np.full(len(x) - 1, name not in self.fixed) for name, x in mesh.cuts.items()})
+            if mesh.elements > ENOUGH:
+                break
+            # On short elements a place that slides does not go so far from where forces say that it is.
+            points = self.lines.points_on(mesh, found)
         self.lines.ending = frozenset()
-        return there
+        return best
 
     def as_lines(self, found: Solved, way: Way, turned: float) -> Solved | None:
         """The state with the two ends of each short line that one point stood for; None where there is none.
