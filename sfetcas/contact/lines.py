@@ -27,6 +27,7 @@ from .closest import LIFTED, Closest
 from .pairs import ONE, SAME, Near, Pair, PairKey
 
 __all__ = [
+    "AT_END",
     "LINE",
     "SHORT_LINE",
     "SLIVER",

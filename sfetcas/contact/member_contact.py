@@ -39,7 +39,7 @@ from ..solvers.pseudo_transient import Drag
 from .closest import Closest
 from .edges import Edges
 from .gripping import CENTRED, FIRM, Gripping, Placed
-from .lines import LINE, SHORT_LINE, SLIVER, Lines, Points, begun, ends_of, points_of
+from .lines import AT_END, LINE, SHORT_LINE, SLIVER, Lines, Points, begun, ends_of, points_of
 from .pairs import ONE, Near, Pair, PairKey, penetrating
 from .passing import Passing, tangents_turned
 from .spread import Numbers, Spread
@@ -1091,15 +1091,17 @@ class MemberContact:
         for _ in range(times):
             if self.lines.off_ends(found) < self.accuracy:
                 break
-            there, points = None, points_of(found)
-            for sliver in (SLIVER, 0.0):
-                mesh, fitted = self.lines.fitted(found.model.mesh, points, prescribed=prescribed, sliver=sliver)
-                if there is None and not mesh.same(replace(found.model.mesh, points=())):
-                    there = self.resolved(mesh, fitted, found, way)
-                # What has become longer may not have the place that slides.
-                lost = there is not None and self.lines.ends_slide(points) > self.lines.ends_slide(points_of(there))
-                if lost or (there is not None and tangents_turned(found.fields, there.fields) > STRIDE):
-                    there = None
+            now, points = replace(found.model.mesh, points=()), points_of(found)
+            there, tried, ended = None, now, self.lines.ends_slide(points)
+            # What has become longer, for its end has moved, may not have the place that slides.
+            for sliver in (SLIVER, AT_END) if ended else (SLIVER,):
+                mesh, fitted = self.lines.fitted(now, points, prescribed=prescribed, sliver=sliver)
+                if there is None and not mesh.same(tried):
+                    there, tried = self.resolved(mesh, fitted, found, way), mesh
+                    if there is not None and tangents_turned(found.fields, there.fields) > STRIDE:
+                        there = None
+                    if there is not None and ended and not self.lines.ends_slide(points_of(there)):
+                        there = None
             if there is None:
                 break
             found = there
