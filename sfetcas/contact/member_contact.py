@@ -589,11 +589,11 @@ class MemberContact:
             for side, free in enumerate(point.slides):
                 if free:
                     y[mine.unknowns[f"{point.place(side)}, arc length"]] = 0.0
+            if point.new:
+                continue
             former = formers.get(point.key)
             going_on = spread.of(target.mesh, point) if point.line and (former is None or former.line) else None
             count = len(mine.multipliers(point))
-            if point.new:
-                continue
             force = np.zeros(0)
             if going_on is not None and len(going_on) == count + len(mine.forces(point)):
                 lam[mine.multipliers(point)], force = going_on[:count], going_on[count:]
@@ -1121,18 +1121,16 @@ class MemberContact:
         self.lines.ending = self.lines.ends_within(found)
         if not self.lines.ending:
             return found
-        mesh, points, best = replace(found.model.mesh, points=()), points_of(found), found
-        while True:
-            there = self.resolved(mesh, self.lines.by_element(points), found, way)
+        mesh, points, best, last = replace(found.model.mesh, points=()), points_of(found), found, 0
+        while last < mesh.elements and (not last or mesh.elements <= ENOUGH):
+            there, last = self.resolved(mesh, self.lines.by_element(points), found, way), mesh.elements
             if there is not None and tangents_turned(found.fields, there.fields) < STRIDE:
                 if self.lines.ends_slide(points_of(there)):
                     best = self.fitted(there, way)
                     break
                 best = there if best is found else best
+            # On shorter elements a place that slides does not go so far from where forces say that it is.
             mesh = mesh.refined({name: np.full(len(x) - 1, name not in self.fixed) for name, x in mesh.cuts.items()})
-            if mesh.elements > ENOUGH:
-                break
-            # On short elements a place that slides does not go so far from where forces say that it is.
             points = self.lines.points_on(mesh, found)
         self.lines.ending = frozenset()
         return best
