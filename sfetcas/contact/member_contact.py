@@ -448,20 +448,16 @@ class MemberContact:
     @staticmethod
     def gaps(prepared: Prepared, points: Iterable[ContactPoint]) -> Index:
         """Numbers of the gaps of points among all residuals; with friction of their pushes, which are unknowns."""
-        equations, model = prepared.equations, prepared.model
-        rows = {name: equations.unknowns + i for i, name in enumerate(model.row_names)}
-        forces = {name: equations.rotation_unknowns + i for i, name in enumerate(model.positions.unknowns)}
-        axes = model.element.axes
-        every = [forces[f"{p.pressed}, across"] if p.grip else rows[p.rows(axes)[-1]] for p in points]
+        equations, own = prepared.equations, Numbers(prepared.model)
+        rows, forces = equations.unknowns, equations.rotation_unknowns
+        every = [forces + own.forces(p)[0] if p.grip else rows + own.multipliers(p)[-1] for p in points]
         return np.array(every, np.intp)
 
     @staticmethod
     def _rubbing(prepared: Prepared, points: Iterable[ContactPoint]) -> Index:
         """Numbers of the friction at points among all unknowns."""
-        first, places = prepared.equations.rotation_unknowns, {p.pressed for p in points if p.grip}
-        names = (name.rsplit(", ", 1) for name in prepared.model.positions.unknowns)
-        found = [first + i for i, (place, *way) in enumerate(names) if place in places and way != ["across"]]
-        return np.array(found, np.intp)
+        first, own = prepared.equations.rotation_unknowns, Numbers(prepared.model)
+        return np.array([first + i for p in points for i in own.forces(p)[1:]], np.intp)
 
     def _known(self, fields: Fields, point: ContactPoint) -> ContactPoint:
         """A point that stays where it is, the gap of which is measured where it is now; between members, across both,
@@ -1108,16 +1104,16 @@ class MemberContact:
         return found
 
     @property
-    def begun(self) -> tuple[Fields | None, frozenset[PairKey]]:
+    def last_step(self) -> tuple[Fields | None, frozenset[PairKey]]:
         """The state from which slip is measured, and the lines: what :meth:`ended` needs to know of the last step."""
         return self.gripping.since, self.lines.keys
 
-    def ended(self, found: Solved, way: Way, begun: tuple[Fields | None, frozenset[PairKey]]) -> Solved:
+    def ended(self, found: Solved, way: Way, last_step: tuple[Fields | None, frozenset[PairKey]]) -> Solved:
         """The state at the end of a way with friction with the places where lines end for unknowns, if it is found.
 
-        ``begun`` is what :attr:`begun` was there.
+        ``last_step`` is what :attr:`last_step` was there.
         """
-        self.gripping.since, self.lines.keys = begun
+        self.gripping.since, self.lines.keys = last_step
         self.lines.ending = self.lines.ends_within(found)
         if not self.lines.ending:
             return found

@@ -13,12 +13,13 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
 
 from ..contact.held_inside import refuse_held_inside
 from ..contact.member_contact import MemberContact
+from ..contact.pairs import PairKey
 from ..description.inserting import stops_between
 from ..errors import SolveError, Status
+from ..mechanics.fields import Fields
 from ..mechanics.mesh import Mesh
 from ..solvers.prepared import Prepared, Solved
 from ..solvers.redundancy import redundant
@@ -59,22 +60,22 @@ class _Sequence:
     steps : sequence of float
         The factors.
     found : list of Solved
-    begun : list
-        What :attr:`.MemberContact.begun` is at each.
+    last_steps : list
+        What :attr:`.MemberContact.last_step` is at each.
     notes : list of tuple of str
     """
 
     run: MemberContact
     steps: Sequence[float]
     found: list[Solved] = field(default_factory=list)
-    begun: list[Any] = field(default_factory=list)
+    last_steps: list[tuple[Fields | None, frozenset[PairKey]]] = field(default_factory=list)
     notes: list[tuple[str, ...]] = field(default_factory=list)
 
     @functools.cached_property
     def ended(self) -> list[Solved]:
         """The states with the places where lines end for unknowns, where that is found."""
-        each = zip(self.found, self.steps, self.begun, strict=True)
-        return [self.run.ended(found, on_way(factor, factor, 1.0), begun) for found, factor, begun in each]
+        each = zip(self.found, self.steps, self.last_steps, strict=True)
+        return [self.run.ended(found, on_way(factor, factor, 1.0), last) for found, factor, last in each]
 
 
 class RoughContactSteps:
@@ -171,7 +172,7 @@ class RoughContactSteps:
                 now = self._known(run, run.follow(partial(on_way, a, b), now), a, b)
                 told += run.notes(a, b)
             sequence.found.append(now)
-            sequence.begun.append(run.begun)
+            sequence.last_steps.append(run.last_step)
             sequence.notes.append(told)
             last = factor
         return sequence
