@@ -14,6 +14,7 @@ from pydantic import BeforeValidator, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
+from ..mathematics.arrays import depends
 from .columns import read_columns
 from .records import Numbers, Record, counted, enumerated, say
 
@@ -84,7 +85,7 @@ class FieldTable(Record):
     def _refuse_parameters(self) -> None:
         for key in ("x", "y", "z", "Bx", "By", "Bz"):
             column = getattr(self, key)
-            if any(hasattr(entry, "expression") for entry in (column, *(column or ()))):
+            if any(depends(entry) for entry in (column, *(column or ()))):
                 raise SceneError("found a number that varies, accepted: numbers, as tables have no parameters", (key,))
 
     @cached_property

@@ -15,6 +15,7 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.load_terms import carried
 from ..mechanics.loading import Loading
 from ..mechanics.mass_centers import along_elements
+from ..mechanics.masses import along_rigid, put_moments
 from ..mechanics.terms import rotation_gradient
 from .stages import StageEquations
 
@@ -127,14 +128,38 @@ class Inertia:
 
     # -- as loads ---------------------------------------------------------------------------------------
 
-    def loading(self, equations: Equations, state: State, loading: Loading, forces: Array) -> Loading:
-        """The loads at a state with the reversed inertia and damping forces (quantities,) added (d'Alembert)."""
-        system, model = self.system, self._model
+    def _changes(self, velocity: Array, acceleration: Array) -> Array:
+        """Accelerations of the places, (places, axes), with those of Coriolis."""
+        system = self.system
+        rates, changes = (self._split(each)[0][: system.places] for each in (velocity, acceleration))
+        return changes if system.crossing is None else changes + rates @ system.crossing.T
+
+    def _at_ends(self, velocity: Array, acceleration: Array) -> Array:
+        """Inertia and damping forces of the ends of elements, (elements, p + 1, axes), zero at inner nodes."""
+        system, masses, changes = self.system, self._masses, self._changes(velocity, acceleration)
+        rates = self._split(velocity)[0]
+        found = np.zeros((*masses.ends.shape, system.axes))
+        for k, at in zip((0, -1), masses.at_ends.T, strict=True):
+            found[:, k] = masses.ends[:, k, None] * changes[at] + masses.ends_drag[:, k, None] * rates[at]
+        return found
+
+    def loading(
+        self, equations: Equations, state: State, loading: Loading, velocity: Array, acceleration: Array
+    ) -> Loading:
+        """The loads at a state with the reversed inertia and damping forces added (d'Alembert).
+
+        Velocities and accelerations are (quantities,).
+        """
+        system, model, forces = self.system, self._model, self.forces(velocity, acceleration)
         linear = -forces[: system.linear].reshape(-1, system.axes)
         on_places, inner = linear[: system.places], linear[system.places :]
         spread = np.zeros_like(loading.spread)
         spread[self._inside] = inner
         pull, carried_to = carried(spread, model.segments, model.element)
+        # Places carry what is at the ends of elements, along which it is spread nevertheless.
+        spread -= self._at_ends(velocity, acceleration)
+        along_members, within = along_rigid(model, self._masses.within, -self._changes(velocity, acceleration))
+        spread, pull = spread + along_members, pull + within
         moment, own = np.zeros_like(loading.moment), on_places.copy()
         couple, jump = loading.couple.copy(), loading.jump.copy()
         along: list[tuple[Index, Array, Array]] = []
@@ -152,7 +177,7 @@ class Inertia:
                 three_of = np.zeros((len(part), 3))
                 three_of[:, 3 - width :] = part
                 np.add.at(moment, turns[used], three_of[used])
-                group.put(three_of, couple, jump)
+                put_moments(group.at, three_of, couple, jump)
             first = width * group.turns.shape[1]
             for side, at in enumerate(group.places.T):
                 used, begin_of = at >= 0, first + system.axes * side

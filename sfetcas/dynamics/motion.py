@@ -154,7 +154,7 @@ class Forces:
         equations, free, sample, rubbing = self._equations, self._free, self._sample, self._system.rubbing
         inertia, friction = self._mover.inertia, np.zeros((0, 0))
         effective = equations.effective(free, self._loading)
-        found = inertia.loading(equations, free, effective, inertia.forces(sample.v, sample.a))
+        found = inertia.loading(equations, free, effective, sample.v, sample.a)
         if rubbing is not None and sample.rubs is not None:
             friction = rubbed(rubbing, equations, free, found, sample)
             found = pushed_along(rubbing, found, friction, rubbing.arms(sample.y, found.shift))

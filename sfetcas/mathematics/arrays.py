@@ -14,7 +14,9 @@ __all__ = [
     "Array",
     "Index",
     "Sparse",
+    "added",
     "cross",
+    "depends",
     "first_of_largest",
     "fixed",
     "length_of",
@@ -49,6 +51,11 @@ def first_of_largest(values: Array, alike: float | None = None) -> int:
     return int(np.argmax(sizes >= (1.0 - alike) * sizes.max()))
 
 
+def depends(value: Any) -> bool:
+    """Whether a value, in any unit, is active: a number or an array of numbers that depend on symbols."""
+    return hasattr(value, "expression")
+
+
 def fixed(array: Array) -> Array:
     """The array (...) itself, made read-only; in any unit."""
     if isinstance(array, np.ndarray):
@@ -66,11 +73,11 @@ def numbers(values: Any) -> Array:
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
-    if hasattr(values, "expression"):
+    if depends(values):
         found: Array = values
         return found
     flat = values if isinstance(values, (list, tuple)) else ()
-    first = next((each for each in flat if hasattr(each, "expression")), None)
+    first = next((each for each in flat if depends(each)), None)
     if first is None:
         try:
             return np.asarray(values, dtype=float)
@@ -84,7 +91,7 @@ def numbers(values: Any) -> Array:
 
 def _depending(values: Any) -> Any:
     """One of the values that depends on parameters, None where none does."""
-    if hasattr(values, "expression"):
+    if depends(values):
         return values
     if isinstance(values, (list, tuple, np.ndarray)):
         return next((found for each in values if (found := _depending(each)) is not None), None)
@@ -96,26 +103,38 @@ def plus(array: Array, key: Any, value: Any) -> Array:
 
     It is modified in place, unless the value is active: then the result is a new active array.
     """
-    if hasattr(value, "expression"):
+    if depends(value):
         array = type(value).of(array)
     array[key] = array[key] + value
     return array
 
 
+def added(array: Array, index: Index, rows: Array) -> Array:
+    """The array (n, ...) with rows (m, ...) of the same unit added to those of an index (m,), some more than once.
+
+    It is modified in place, unless either is active: then the result is a new active array.
+    """
+    if depends(array) or depends(rows):
+        onto = (np.arange(len(array))[:, None] == index) @ rows.reshape(len(rows), int(np.prod(rows.shape[1:])))
+        return numbers(array + onto.reshape(array.shape))
+    if array.ndim == 1:
+        # The same sums, in the same order, many times faster.
+        array += np.bincount(index, weights=rows, minlength=len(array))
+    else:
+        np.add.at(array, index, rows)
+    return array
+
+
 def scattered(count: int, index: Index, rows: Array) -> Array:
     """Sums (count, n) of the rows (m, n) with the same index (m,)."""
-    if hasattr(rows, "expression"):
-        return numbers((np.arange(count)[:, None] == index) @ rows)
-    found = np.zeros((count, rows.shape[1]))
-    np.add.at(found, index, rows)
-    return found
+    return added(np.zeros((count, rows.shape[1])), index, rows)
 
 
 def values_of(value: Any) -> Any:
     """The values of active numbers, also in lists; anything else unchanged."""
     if type(value) in (list, tuple):
         return type(value)(values_of(each) for each in value)
-    return getattr(value, "values", value) if hasattr(value, "expression") else value
+    return getattr(value, "values", value) if depends(value) else value
 
 
 def unit(vectors: object) -> Array:

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from .. import tolerances
-from .arrays import TINY, Array, Index
+from .arrays import TINY, Array, Index, added, depends, numbers
 from .core import Factors, Pivoted, System, core, doubles
 from .keeping import kept
 from .kernels import Batch
@@ -49,7 +49,7 @@ class SparseMap:
     Attributes
     ----------
     row, column, value : ndarray (n,)
-        The entries, without repetitions, sorted by rows.
+        The entries, without repetitions, sorted by rows; of active ones there are no products.
     shape : (int, int)
     """
 
@@ -58,14 +58,14 @@ class SparseMap:
         places = np.asarray(row, dtype=np.int64) * shape[1] + column
         if not ((places[1:] > places[:-1]).all() and value.all()):
             places, inverse = np.unique(places, return_inverse=True)
-            value = np.bincount(inverse.ravel(), weights=value, minlength=len(places))
+            value = added(np.zeros(len(places)), inverse.ravel(), value)
             keep = value != 0.0
             places, value = places[keep], value[keep]
             row, column = np.divmod(places, max(shape[1], 1))
         self.row, self.column = np.asarray(row, np.intp), np.asarray(column, np.intp)
-        self.value = np.asarray(value, dtype=float)
+        self.value = numbers(value)
         # Small matrices are faster in full.
-        self._full = self.full() if shape[0] * shape[1] <= FULL else None
+        self._full = self.full() if shape[0] * shape[1] <= FULL and not depends(value) else None
 
     @functools.cached_property
     def T(self) -> SparseMap:  # noqa: N802 - the name of NumPy

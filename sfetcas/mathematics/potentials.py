@@ -26,7 +26,7 @@ from typing import Any
 
 import casadi as ca
 
-from .arrays import Array, numbers, values_of
+from .arrays import Array, depends, numbers, values_of
 from .forms import BOTH, Form
 from .hysteresis import energies
 
@@ -283,7 +283,7 @@ def at_rest(text: str, p: Array) -> tuple[Array, Array]:
     """
     rest = _at_rest(text)
     gradient, hessian = (part.full() for part in rest(values_of(p)))
-    if hasattr(p, "expression"):
+    if depends(p):
         active: Any = p
         return gradient.ravel(), numbers(type(active)(hessian, ca.vec(rest(active.expression)[1].T)))
     return gradient.ravel(), hessian

@@ -16,7 +16,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import TINY, Array, numbers
+from .arrays import TINY, Array, depends, numbers
 
 __all__ = [
     "Components",
@@ -78,7 +78,7 @@ def _components(a: ArrayLike) -> list[Array]:
 
 def _stacked(parts: list[Array]) -> Array:
     """The inverse; sums of products have the shape that all are broadcast to."""
-    if any(hasattr(part, "expression") for part in parts):
+    if any(depends(part) for part in parts):
         return np.moveaxis(numbers(parts), 0, -1)
     found = np.empty((*np.shape(parts[0]), len(parts)))
     for i, part in enumerate(parts):

@@ -27,7 +27,7 @@ from ..description.scene import Scene
 from ..description.sections import breaks
 from ..errors import SceneError
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, numbers, values_of
+from ..mathematics.arrays import Array, depends, numbers, values_of
 from ..mathematics.interpolation import gauss, integration
 from ..mathematics.keeping import kept
 
@@ -198,7 +198,7 @@ def _against(scene: Scene, name: str, compliance: Array) -> tuple[Array, Array]:
     if line.turning == 0.0:
         # The length of what is straight, whatever rounding says.
         still = np.concatenate([line.tangents(np.array([0.0]))[0], np.zeros(3)])[None, own]
-    elif len(still) and hasattr(energies, "expression"):
+    elif len(still) and depends(energies):
         raise SceneError("found a member that is all but straight, accepted: one that is straight", ("members", name))
     shift = values[-1] * (still.T @ still)
     found = np.linalg.inv(energies + shift) - shift / values[-1] ** 2

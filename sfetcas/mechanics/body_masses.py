@@ -22,7 +22,7 @@ from .. import tolerances
 from ..description.matrices import rigid_motions
 from ..description.scene import Scene
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, numbers
 from .bodies import BodyData, body_of, quadrature, shapes_along
 
 __all__ = ["BodyMass", "body_mass", "euler_weights"]
@@ -61,7 +61,7 @@ class BodyMass:
 
 def euler_weights(inertia: Array) -> Array:
     """Weights of axes (..., 3) as particles that have the moments of inertia (..., 3) about them, in the same unit."""
-    return np.asarray(0.5 * inertia.sum(axis=-1, keepdims=True) - inertia)
+    return numbers(0.5 * inertia.sum(axis=-1, keepdims=True) - inertia)
 
 
 def body_mass(scene: Scene, name: str) -> BodyMass | None:

@@ -28,7 +28,7 @@ from .evaluation import UNLOADED, CoreModel, CorePoint, core_model
 from .layout import Layout, layout_of
 from .load_terms import present
 from .loading import Loading
-from .mass_centers import along_elements
+from .masses import along_rigid, put_moments
 from .model import Model
 from .reactions import Reactions
 from .rotations import RotationFreedom
@@ -676,30 +676,28 @@ class Equations:
 
     def acting(self, state: State, loading: Loading) -> Loading:
         """The effective loading, in rotating axes with the centrifugal forces."""
-        loading, rotating_frame = self.effective(state, loading), self.model.rotating_frame
-        if rotating_frame is None:
-            return loading
-        places = self.places(state, loading)
-        u = places.reshape(len(self.model.segments.places), -1)
-        matrix = loading.loads[rotating_frame.pairs][0].reshape(u.shape[1], -1)
-        found = loading.plus(rotating_frame.positional(self.model, u, turned_tangents(self.model, state), matrix))
-        moment, couple, jump, force = (
-            np.zeros_like(part) for part in (found.moment, found.couple, found.jump, found.force)
+        found, frame = self.effective(state, loading), self.model.rotating_frame
+        if frame is None:
+            return found
+        moment, force, couple, jump = (
+            np.zeros_like(part) for part in (found.moment, found.force, found.couple, found.jump)
         )
-        massive = [group for group in rotating_frame.masses.observables if group.kind.vectors]
-        along: list[tuple[Index, Array, Array]] = []
-        for number, observed in zip(rotating_frame.bodies, massive, strict=True):
+        u, turns = self.places(state, loading).reshape(force.shape), self.model.element.turns
+        for number, at in zip(frame.groups, frame.at, strict=True):
             group = self._terms[1 + number]
-            if observed.along is not None:
-                along.append((*observed.along, rotating_frame.at_points(self.model, observed, state.q, places, matrix)))
-                continue
             forces = -group(state, u, loading.loads[number], np.zeros(0))[3]
             group.add_forces(forces, moment, force)
-            turns = self.model.element.turns
-            observed.put(np.pad(forces[:, :turns], ((0, 0), (3 - turns, 0))), couple, jump)
-        found = along_elements(self.model, state.q, found, along)
+            put_moments(at, np.pad(forces[:, :turns], ((0, 0), (3 - turns, 0))), couple, jump)
+        spread, pull = found.spread, found.pull
+        if frame.within.any():
+            # What rigid members have at their ends is of the first of these groups.
+            pushes = (frame.rest + u) @ loading.loads[frame.groups[0]][0].reshape(u.shape[1], -1)
+            more = along_rigid(self.model, frame.within, pushes)
+            spread, pull = spread + more[0], pull + more[1]
         return replace(
             found,
+            spread=spread,
+            pull=pull,
             moment=found.moment + moment,
             couple=found.couple + couple,
             jump=found.jump + jump,

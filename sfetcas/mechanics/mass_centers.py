@@ -37,7 +37,7 @@ __all__ = ["CentredWeight", "MassPoints", "along_elements", "arms_of", "center_w
 @final
 @dataclass(frozen=True)
 class MassPoints(Term):
-    """Points that the nodes of an element carry, at the ends of arms that turn with them.
+    """Points that the nodes of an element carry, at the ends of arms that turn with them; see :meth:`arms`.
 
     Data: of each node its place relative to the start of the element in the undeformed scene and its arm, then tangents
     and compliances of the element; dimensionless, fixed axes.
@@ -47,6 +47,8 @@ class MassPoints(Term):
     element : Element
         The element, which integrates at its nodes.
     """
+
+    along_element: ClassVar[bool] = True
 
     element: Element
 
@@ -69,14 +71,18 @@ class MassPoints(Term):
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """Where the points are, relative to the undeformed start of the element."""
         n, axes = self.vectors, self.axes
-        rest, arms = (ca.reshape(data[i * n * axes : (i + 1) * n * axes], axes, n) for i in range(2))
-        line = data[2 * n * axes :]
+        rest, line = ca.reshape(data[: n * axes], axes, n), data[2 * n * axes :]
         gained = ca.horzcat(*self.element.tangents(q, u[1:], line)) - self.element.line(line)[0]
         onto = ca.DM(self.element.to_points / self.element.weights)
         # The first node is the place itself.
         moved = rest + ca.repmat(ca.vertcat(*u[0]), 1, n) + ca.mtimes(gained, ca.sparsify(onto.T))
-        turned = ca.horzcat(*[ca.vertcat(*self.forth(q[k], ca.vertsplit(arms[:, k]))) for k in range(n)])
-        return ca.vertsplit(ca.vec(moved + turned))
+        return ca.vertsplit(ca.vec(moved + ca.horzcat(*self.arms(q, data))))
+
+    def arms(self, q: list[Side], data: ca.SX) -> list[ca.SX]:
+        """The turned arms of the nodes."""
+        n, axes = self.vectors, self.axes
+        arms = ca.reshape(data[n * axes : 2 * n * axes], axes, n)
+        return [ca.vertcat(*self.forth(q[k], ca.vertsplit(arms[:, k]))) for k in range(n)]
 
 
 @final

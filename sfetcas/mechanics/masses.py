@@ -9,6 +9,7 @@ The unit of time is that in which the whole mass is one: ``sqrt(mass length^2 / 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,16 +19,18 @@ from ..description.shapes import Straight, place
 from ..description.tubes import mass_of_tubes
 from ..errors import SceneError
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import Array, Index, added, depends, numbers, plus
 from ..mathematics.interpolation import differentiation, pieces
 from ..mathematics.linear import SparseMap
+from .bodies import body_of
 from .body_masses import BodyMass, body_mass, euler_weights
 from .body_points import BodyPoints, points_of
+from .load_terms import pull_within
 from .mass_centers import MassPoints, arms_of
 from .observed import Axes, SpringTravel, Strains, Stretches
 from .terms import Term
 
-__all__ = ["Masses", "Observables", "masses_of"]
+__all__ = ["Masses", "Observables", "Turning", "along_rigid", "masses_of", "put_moments"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +68,24 @@ class Observables:
     at: Index | None = None
     along: tuple[Index, Array] | None = None
 
-    def put(self, moments: Array, couple: Array, jump: Array) -> None:
-        """Add moments (n, 3), in place and as ``at`` says, to ``couple`` (places, 3) and ``jump`` (elements, 3)."""
-        for sums, number in () if self.at is None else zip((couple, jump), self.at.T, strict=True):
-            np.add.at(sums, number[number >= 0], moments[number >= 0])
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """Rotary inertia of what is no flexible member.
+
+    Attributes
+    ----------
+    turns : ndarray (n,)
+        Numbers of the rotations.
+    at : ndarray (n, 2)
+        Place and element to whose balance of moments they belong, as :attr:`.Observables.at`.
+    spread : ndarray (n, 3, 3)
+        Sums of weight times b b^T over the axes b that turn with them.
+    """
+
+    turns: Index
+    at: Index
+    spread: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +100,20 @@ class Masses:
         Mass matrix of the places.
     place_drag : ndarray (places,)
         Drag coefficients of the places.
+    alone : SparseMap (places, places)
+        The share of ``places`` that is of nodes and rigid members, not of flexible ones.
     inner, inner_drag : ndarray (elements, p + 1)
         Mass and drag of the inner nodes of flexible elements; zero at the ends, which are places.
+    ends, ends_drag : ndarray (elements, p + 1)
+        What the ends of flexible elements add to ``places`` and ``place_drag``; zero at inner nodes.
+    at_ends : ndarray (elements, 2)
+        Numbers of these places.
+    within : ndarray (elements, p + 1)
+        Masses of straight rigid members at the nodes of their elements, which ``alone`` has at their ends.
+    spins : ndarray (elements, p + 1, 3, 3)
+        Rotary inertia of the nodes of flexible elements: sums of weight times b b^T over the axes b that turn along.
+    turning : Turning
+        The same of nodes and rigid members.
     observables : tuple of Observables
         Section axes, strains, springs, points of small members.
     """
@@ -93,20 +122,66 @@ class Masses:
     mass: float
     places: SparseMap
     place_drag: Array
+    alone: SparseMap
     inner: Array
     inner_drag: Array
+    ends: Array
+    ends_drag: Array
+    at_ends: Index
+    within: Array
+    spins: Array
+    turning: Turning
     observables: tuple[Observables, ...]
 
 
-def masses_of(model: Any) -> Masses:
+def put_moments(at: Index | None, moments: Array, couple: Array, jump: Array) -> None:
+    """Add moments (n, 3), in place and as :attr:`.Observables.at` says, to ``couple`` (places, 3) and ``jump``
+    (elements, 3).
+    """
+    for sums, number in () if at is None else zip((couple, jump), at.T, strict=True):
+        np.add.at(sums, number[number >= 0], moments[number >= 0])
+
+
+def along_rigid(model: Any, within: Array, pushes: Array) -> tuple[Array, Array]:
+    """What masses along straight rigid members add to the distributed forces and to the pull, (elements, p + 1, axes).
+
+    Their ends have the forces already: what is added is in balance, and changes section forces between the ends alone.
+
+    Parameters
+    ----------
+    within : ndarray (elements, p + 1)
+        As of :class:`Masses`.
+    pushes : ndarray (places, axes)
+        Forces on a unit of mass at the places, between which they are linear.
+    """
+    spread = np.zeros((*within.shape, pushes.shape[1]))
+    pull = np.zeros_like(spread)
+    for name, member in model.scene.members.items():
+        if member.type != "rigid" or not within[model.elements_of(name)].any():
+            continue
+        part, cuts, places = model.elements_of(name), model.mesh.cuts[name], model.segments
+        start, end = (pushes[places.place(places.ends[name, i])] for i in range(2))
+        x = (cuts[:-1, None] + np.diff(cuts)[:, None] * model.element.nodes)[..., None]
+        forces = within[part][..., None] * ((1.0 - x) * start + x * end)
+        on_element = forces.sum(axis=1)
+        beyond = np.cumsum(on_element[::-1], axis=0)[::-1] - on_element
+        at_end = (x * forces).sum(axis=(0, 1))
+        spread[part], pull[part] = forces, pull_within(forces, model.element) + (at_end - beyond)[:, None]
+    return spread, pull
+
+
+def masses_of(model: Any, *, moving: bool = True) -> Masses:
     """The masses of a :class:`~sfetcas.mechanics.model.Model` whose mesh has a place at every end of an element.
+
+    Without ``moving`` section axes, which ``spins`` and ``turning`` tell of, and what has dampers alone are no
+    observables.  Then numbers of the scene may be symbols, but for those on which a small member's inertia depends.
 
     Raises
     ------
     SceneError
-        Nothing has mass.
+        Nothing has mass; a small member's inertia depends on symbols.
     """
-    return _Weigher(model).all()
+    return _Weigher(model).all(moving)
 
 
 class _Weigher:
@@ -116,21 +191,22 @@ class _Weigher:
         self.model, self.scene = model, model.scene
         self.space, self.axes = model.space, model.element.axes
         count = len(model.segments.places)
-        self.entries: list[tuple[int, int, float]] = []
+        # Rows, columns and values of the mass matrix of the places, without what flexible members add.
+        self.entries: list[tuple[Index, Index, Array]] = []
         self.drag = np.zeros(count)
-        self.inner, self.inner_drag = np.zeros(model.beams.weight.shape), np.zeros(model.beams.weight.shape)
-        # Of each rotation the sum of weight times b b^T over the axes b that turn with it.
-        self.spread = np.zeros((len(model.rotations.kind), 3, 3))
-        # The same of what turns with rigid members, by rotation, place and element.
-        self.shared: dict[tuple[int, int, int], Array] = {}
+        self.nodal, self.nodal_drag, self.within = (np.zeros(model.beams.weight.shape) for _ in range(3))
+        # Sums of weight times b b^T over the axes b that turn with nodes of flexible elements, and by rotation, place
+        # and element with everything else.
+        self.spins = np.zeros((*model.beams.weight.shape, 3, 3))
+        self.turning: dict[tuple[int, int, int], Array] = {}
         rigid = [name for name, member in self.scene.members.items() if member.type == "rigid"]
         self.rigid = {int(model.rotations.ends[name][0]) for name in rigid}
         self.bodies: dict[str, BodyMass] = {}
         # Of points along members: elements, arms (m), masses and dampers, each by elements and nodes.
         self.points: list[tuple[Index, Array, Array, Array]] = []
-        self.total = 0.0
+        self.total: Any = 0.0
 
-    def all(self) -> Masses:
+    def all(self, moving: bool) -> Masses:
         """Everything that the scene gives a mass or a damper."""
         model, scene = self.model, self.scene
         for name, member in scene.members.items():
@@ -138,54 +214,77 @@ class _Weigher:
                 self._add_flexible(name)
             elif member.type == "rigid" and member.section is not None:
                 self._add_rigid(name)
-            elif member.type == "small" and (found := body_mass(scene, name)) is not None:
+            elif member.type == "small" and (found := self._body(name)) is not None:
                 self.bodies[name] = found
                 self.total += found.mass
         for name, node in scene.nodes.items():
             number = model.segments.place(name)
             self._at(number, number, node.mass)
             self.total += node.mass
-            self.drag[number] += node.drag
+            self.drag = plus(self.drag, number, node.drag)
             turn = model.rotations.node_turn[name]
             if node.inertia is not None and turn is not None:
-                self._turning(turn, np.diag(euler_weights(np.asarray(node.inertia))), place=number)
+                self._turn(turn, np.diag(euler_weights(numbers(node.inertia))), place=number)
         length, moment = model.scales.length, model.scales.moment
         if self.total <= 0.0:
             raise SceneError("nothing has a mass, accepted: a section with rhoA, or a node with mass")
         mass = self.total
-        time = float(np.sqrt(mass / moment)) * length
+        time = np.sqrt(mass / moment) * length
         of_drag = mass / time
-        row, column, value = (np.array(part) for part in zip(*self.entries, strict=True))
-        size = (len(self.drag), len(self.drag))
-        groups = [
-            *self._axes(mass * length**2),
-            *self._bodies(mass),
-            *self._points(mass, of_drag),
-            *self._strains(time),
-            *self._stretches(time),
-            *self._relaxations(time),
-            *self._springs(time),
-        ]
+        inside = np.ones(self.nodal.shape[1])
+        inside[[0, -1]] = 0.0
+        owners = [model.segments.parts[i] for i in model.segments.owner]
+        at_ends = [[model.segments.place(each) for each in (one.start, one.end)] for one in owners]
+        number = np.array(at_ends, dtype=np.intp).ravel()
+        masses, drags = (part[:, [0, -1]].ravel() for part in (self.nodal, self.nodal_drag))
+        of_turning, keys = mass * length**2, np.array(list(self.turning), dtype=np.intp).reshape(-1, 3)
+        spread = numbers(list(self.turning.values()) or np.zeros((0, 3, 3))) / of_turning
+        groups = [*self._bodies(mass), *self._points(mass, of_drag)]
+        if moving:
+            groups += [*self._strains(time), *self._stretches(time), *self._relaxations(time), *self._springs(time)]
+            groups = [*self._axes(of_turning), *groups]
         return Masses(
             time=time,
             mass=mass,
-            places=SparseMap(row, column, value / mass, size),
-            place_drag=self.drag / of_drag,
-            inner=self.inner / mass,
-            inner_drag=self.inner_drag / of_drag,
+            places=self._on_places([*self.entries, (number, number, masses)], mass),
+            place_drag=added(self.drag, number, drags) / of_drag,
+            alone=self._on_places(self.entries, mass),
+            inner=inside * self.nodal / mass,
+            inner_drag=inside * self.nodal_drag / of_drag,
+            ends=(1.0 - inside) * self.nodal / mass,
+            ends_drag=(1.0 - inside) * self.nodal_drag / of_drag,
+            at_ends=number.reshape(-1, 2),
+            within=self.within / mass,
+            spins=self.spins / of_turning,
+            turning=Turning(keys[:, 0], keys[:, 1:], spread),
             observables=tuple(groups),
         )
 
-    def _at(self, row: int, column: int, mass: float) -> None:
-        self.entries.append((row, column, mass))
+    def _on_places(self, entries: Sequence[tuple[Index, Index, Array]], unit: Any) -> SparseMap:
+        row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
+        return SparseMap(row, column, value / unit, (len(self.drag), len(self.drag)))
 
-    def _turning(self, turn: int, spread: Array, place: int = -1, element: int = -1) -> None:
-        """Sum of weight times b b^T over axes b that turn with a rotation, of a node or within an element."""
-        if turn in self.rigid:
-            key = (turn, place, element)
-            self.shared[key] = self.shared.get(key, np.zeros((3, 3))) + spread
-        else:
-            self.spread[turn] += spread
+    def _at(self, row: Any, column: Any, mass: Any) -> None:
+        """Add entries of the mass matrix, one or several."""
+        rows, columns = (np.atleast_1d(np.asarray(part, dtype=np.intp)) for part in (row, column))
+        self.entries.append((rows, columns, np.atleast_1d(numbers(mass))))
+
+    def _body(self, name: str) -> BodyMass | None:
+        """Inertia of a small member, which is found in plain numbers."""
+        body = body_of(self.scene, name)
+        if body.weight is None:
+            return None
+        of_mass = [body.rest, body.stiff, body.mass, *vars(body.weight).values()]
+        found = None if any(map(depends, of_mass)) else body_mass(self.scene, name)
+        if any(map(depends, of_mass if found is None else vars(found).values())):
+            message = "found a small member whose inertia depends on numbers that change, accepted: numbers on which it"
+            raise SceneError(f"{message} does not depend", ("members", name))
+        return found
+
+    def _turn(self, turn: int, spread: Array, place: int = -1, element: int = -1) -> None:
+        """Sum of weight times b b^T over axes b that turn with a rotation, of a node or a rigid member."""
+        key = turn, place, element
+        self.turning[key] = self.turning.get(key, np.zeros((3, 3))) + spread
 
     # -- members --------------------------------------------------------------------------------
 
@@ -197,24 +296,15 @@ class _Weigher:
         weights = line.length * np.diff(cuts)[:, None] * element.weights
         mass = (section.mass(x.ravel()).reshape(x.shape) + mass_of_tubes(self.scene, name, x)) * weights
         drag = section.drag * weights
-        self.total += float(mass.sum())
+        self.total += mass.sum()
         mass, drag = self._off_line(name, x, mass, drag)
-        for e, (m, d) in enumerate(zip(mass, drag, strict=True), start=part.start):
-            segment = model.segments.parts[model.segments.owner[e]]
-            for place_name, k in ((segment.start, 0), (segment.end, -1)):
-                number = model.segments.place(place_name)
-                self._at(number, number, float(m[k]))
-                self.drag[number] += d[k]
-            self.inner[e, 1:-1], self.inner_drag[e, 1:-1] = m[1:-1], d[1:-1]
+        self.nodal, self.nodal_drag = plus(self.nodal, part, mass), plus(self.nodal_drag, part, drag)
         inertia = section.inertia(x.ravel())
         if inertia.any():
             frames = quaternion.matrix(line.quaternions(x.ravel()))
             parts = euler_weights(inertia * weights.ravel()[:, None])
             spread = np.einsum("nij,nj,nkj->nik", frames, parts, frames)
-            chain = model.rotations.turns[part].ravel()
-            np.add.at(self.spread, chain[1:-1], spread[1:-1])
-            for i in (0, -1):
-                self._turning(int(chain[i]), spread[i], place=model.segments.place(model.segments.ends[name, -i]))
+            self.spins = plus(self.spins, part, spread.reshape(*x.shape, 3, 3))
 
     def _off_line(self, name: str, x: Array, mass: Array, drag: Array) -> tuple[Array, Array]:
         """Masses and drags (elements, nodes) that are left on the line of a member; all others become points.
@@ -249,25 +339,52 @@ class _Weigher:
         start, end = (scene.nodes[n].position for n in member.nodes)
         chord = place(Straight(), start, end, member.b2, ("members", name))
         share = section.mass(x) * w * chord.length
-        self.total += float(share.sum())
+        self.total += share.sum()
         a, b = (self.model.segments.place(self.model.segments.ends[name, i]) for i in range(2))
         for row, column, weight in ((a, a, (1 - x) ** 2), (a, b, x * (1 - x)), (b, a, x * (1 - x)), (b, b, x**2)):
-            self._at(row, column, float(share @ weight))
+            self._at(row, column, share @ weight)
+        if scene.center_lines[name].turning == 0.0:
+            self.within = plus(self.within, self.model.elements_of(name), self._nodes_along(name, section.mass))
         inertia = (section.inertia(x) * (w * chord.length)[:, None]).sum(axis=0)
         frame = quaternion.matrix(chord.quaternions(np.array([0.5])))[0]
         turned = frame @ np.diag(euler_weights(inertia)) @ frame.T
-        self._turning(int(self.model.rotations.ends[name][0]), turned, element=self.model.elements_of(name).start)
+        self._turn(int(self.model.rotations.ends[name][0]), turned, element=self.model.elements_of(name).start)
+
+    def _nodes_along(self, name: str, density: Callable[[Array], Array]) -> Array:
+        """Masses (elements, p + 1), kg, of a member at the nodes of its elements."""
+        element, cuts = self.model.element, self.model.mesh.cuts[name]
+        x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.nodes
+        weights = self.scene.center_lines[name].length * np.diff(cuts)[:, None] * element.weights
+        return numbers(density(x.ravel()).reshape(x.shape) * weights)
 
     # -- groups ---------------------------------------------------------------------------------
 
     def _axes(self, unit: float) -> list[Observables]:
         """Rotary inertia of all rotations that have any."""
-        turns, at = np.arange(len(self.spread)), np.full((len(self.spread), 2), -1)
-        spread = self.spread
-        if self.shared:
-            keys = np.array(list(self.shared))
+        rotations, places = self.model.rotations, self.model.segments
+        spread, shared = np.zeros((len(rotations.kind), 3, 3)), dict[tuple[int, int, int], Array]()
+
+        def put(turn: int, place: int, element: int, own: Array) -> None:
+            if turn in self.rigid:
+                key = turn, place, element
+                shared[key] = shared.get(key, np.zeros((3, 3))) + own
+            else:
+                spread[turn] += own
+
+        for name, member in self.scene.members.items():
+            part = self.model.elements_of(name) if member.type == "flexible" else slice(0)
+            if self.spins[part].any():
+                chain, own = rotations.turns[part].ravel(), self.spins[part].reshape(-1, 3, 3)
+                np.add.at(spread, chain[1:-1], own[1:-1])
+                for i in (0, -1):
+                    put(int(chain[i]), places.place(places.ends[name, -i]), -1, own[i])
+        for key, own in self.turning.items():
+            put(*key, own)
+        turns, at = np.arange(len(spread)), np.full((len(spread), 2), -1)
+        if shared:
+            keys = np.array(list(shared))
             turns, at = np.concatenate([turns, keys[:, 0]]), np.concatenate([at, keys[:, 1:]])
-            spread = np.concatenate([spread, list(self.shared.values())])
+            spread = np.concatenate([spread, list(shared.values())])
         if not self.space:
             # The turning of one direction: about z, the sum of the weights of what lies in the plane.
             about = spread[:, 0, 0] + spread[:, 1, 1]
@@ -292,12 +409,13 @@ class _Weigher:
         for name, body in self.bodies.items():
             kind, data = points_of(name, body, self.space, scales.length)
             places = [segments.place(segments.ends[name, i]) for i in range(kind.nodes)]
-            mass = np.full(kind.sizes[2], body.mass / unit)
+            mass = body.mass / unit * np.ones(kind.sizes[2])
             found.setdefault(kind, []).append((np.array(rotations.ends[name]), np.array(places), data, mass))
         groups = []
         for kind, members in found.items():
-            turns, sides, numbers, masses = (np.array(part) for part in zip(*members, strict=True))
-            groups.append(Observables(kind, turns, sides, numbers, masses, np.zeros(masses.shape)))
+            turns, sides, data = (np.array([member[i] for member in members]) for i in range(3))
+            mass = numbers([member[3] for member in members])
+            groups.append(Observables(kind, turns, sides, data, mass, np.zeros(mass.shape)))
         return groups
 
     def _points(self, unit: float, of_drag: float) -> list[Observables]:
@@ -314,8 +432,8 @@ class _Weigher:
             part, line, cuts = model.elements_of(name), self.scene.center_lines[name], model.mesh.cuts[name]
             x = cuts[:-1, None] + np.diff(cuts)[:, None] * model.element.nodes
             places = line.positions(x.ravel())[:, :axes].reshape(*x.shape, axes) / length
-            own = (elements >= part.start) & (elements < part.stop)
-            rest[own] = (places - places[:, :1])[elements[own] - part.start]
+            own = np.flatnonzero((elements >= part.start) & (elements < part.stop))
+            rest = plus(rest, own, (places - places[:, :1])[elements[own] - part.start])
         line_data = model.beams.flat("tangent", "compliance")[elements]
         data = np.hstack([rest.reshape(len(rest), -1), arms.reshape(len(arms), -1), line_data])
         places = np.hstack([start[:, None], model.segments.strains[elements]])

@@ -24,7 +24,7 @@ import numpy as np
 from ..description.scene import Scene
 from ..description.supports import drives
 from ..errors import SceneError
-from ..mathematics.arrays import Array, Index, normals, numbers, unit
+from ..mathematics.arrays import Array, Index, depends, normals, numbers, unit
 from ..mathematics.keeping import Recent
 from ..mathematics.linear import SparseMap
 from .mesh import Mesh
@@ -88,7 +88,7 @@ Source = tuple[str, int]
 def _guide(scene: Scene, name: str) -> tuple[float, ...]:
     """Unit vector along the guide of a node."""
     direction, axes = numbers(scene.nodes[name].direction), 2 if scene.resolved_dimension == "plane" else 3
-    if hasattr(direction, "expression"):
+    if depends(direction):
         message = "found a guide that turns with parameters, accepted: one that stays, as unknowns go along it"
         raise SceneError(message, ("nodes", name, "direction"))
     return tuple(unit(direction[:axes]).tolist())

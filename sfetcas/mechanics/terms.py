@@ -224,6 +224,10 @@ class Term(Components, abc.ABC):
         """The elastic part of the energy: what it is without loads, unless loads change what is free of stress."""
         return ca.substitute(self.energy(q, u, data, load), load, ca.SX.zeros(load.shape))
 
+    def arms(self, q: list[Side], data: ca.SX) -> list[ca.SX]:
+        """Of a kind whose vectors are ends of arms that turn with the nodes of an element: these arms, turned."""
+        return []
+
     def densities(
         self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX
     ) -> tuple[list[ca.SX], list[ca.SX]] | None:

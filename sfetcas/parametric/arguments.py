@@ -832,7 +832,8 @@ def refuse_idle(names: Sequence[str]) -> None:
 
 def _loadings(model: Model) -> dict[str | None, Loading]:
     """Loadings of a model by the names of their histories, with that which is there at every factor."""
-    return {**model.groups, **({} if model.constant is None else {ALWAYS: model.constant})}
+    standing = [(loading, 1.0) for loading in model.standing]
+    return {**model.groups, **({ALWAYS: Loading.combined(standing)} if standing else {})}
 
 
 def _course(history: History) -> Active:

@@ -459,8 +459,6 @@ def refuse_search(
             lacking = "without friction" if stopped else lacking
             message = f"whether a tendon is slack is found by a search that is {lacking}, accepted: pushes = true, with"
             raise SceneError(f"{message} which it is kept as long as given, or a stiffness", ("tendons", name))
-    if scene.rotating is not None:
-        raise SceneError(f"turning axes are {lacking}, {instead}", ("rotating",))
 
 
 def solved_steps(scene: Scene, settings: Settings) -> Solution:

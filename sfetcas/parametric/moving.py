@@ -79,11 +79,15 @@ def parametric_stages(arguments: Arguments, masses: Masses, unilateral: Unilater
     Raises
     ------
     SceneError
-        An argument changes masses.
+        An argument changes masses, or how axes rotate.
     """
-    found = masses_of(arguments.model)
+    model = arguments.model
+    found, frame = masses_of(model), model.rotating_frame
     if not _same(masses, found):
         raise SceneError("found numbers that change masses, accepted: loads, motions, stiffness", ("arguments",))
+    # Coriolis forces are weights of rates, as masses are of accelerations.
+    if frame is not None and not _alike(frame.omega, np.asarray(model.scene.rotating) * masses.time):
+        raise SceneError("found numbers that turn the axes, accepted: loads, motions, stiffness", ("arguments",))
     return ParametricStages(arguments, found, unilateral)
 
 
@@ -108,4 +112,8 @@ def _same(one: Masses, other: Masses) -> bool:
     pairs += [(one.places.value, other.places.value)]
     pairs += [(a.mass, b.mass) for a, b in zip(one.observables, other.observables, strict=True)]
     pairs += [(a.damping, b.damping) for a, b in zip(one.observables, other.observables, strict=True)]
-    return all(a.shape == b.shape and np.allclose(a, b, rtol=tolerances.DECIMAL, atol=0.0) for a, b in pairs)
+    return all(_alike(a, b) for a, b in pairs)
+
+
+def _alike(one: Array, other: Array) -> bool:
+    return one.shape == other.shape and bool(np.allclose(one, other, rtol=tolerances.DECIMAL, atol=0.0))
