@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
 from ..mathematics.constants import mapped
 from ..mathematics.linear import SparseMap
@@ -13,9 +14,10 @@ from ..mechanics.balance import three
 from ..mechanics.batches import GroupBatch
 from ..mechanics.equations import Equations, State
 from ..mechanics.load_terms import carried
-from ..mechanics.loading import Loading
+from ..mechanics.loading import Dampers, Loading
 from ..mechanics.mass_centers import along_elements
-from ..mechanics.masses import along_rigid, put_moments
+from ..mechanics.masses import along_rigid, couples_along, put_moments, turned_within
+from ..mechanics.relaxation import strain_units
 from ..mechanics.terms import rotation_gradient
 from .stages import StageEquations
 
@@ -143,6 +145,42 @@ class Inertia:
             found[:, k] = masses.ends[:, k, None] * changes[at] + masses.ends_drag[:, k, None] * rates[at]
         return found
 
+    def _turning(self, q: Array, velocity: Array, acceleration: Array) -> Array:
+        """Matrices (rotations, axes, axes) that give the accelerations of axes that turn with rotations from these."""
+        system, found = self.system, np.zeros((len(q), self.system.axes, self.system.axes))
+        for group, (begin, end) in zip(self._masses.observables, system.ranges, strict=True):
+            if group.at is None:
+                continue
+            shape = len(group.data), group.kind.vectors, system.axes
+            axes = quaternion.turned_by(q[group.turns], group.data.reshape(shape))
+            rates, changes = (each[begin:end].reshape(shape) for each in (velocity, acceleration))
+            changes = changes if system.crossing is None else changes + rates @ system.crossing.T
+            if system.axes == 3:
+                found[group.turns[:, 0]] = np.einsum("nia,nib->nab", changes, axes)
+                continue
+            (x, y), (u, v) = axes[:, 0].T, changes[:, 0].T
+            along, across = x * u + y * v, x * v - y * u
+            found[group.turns[:, 0]] = np.moveaxis(np.array([[along, -across], [across, along]]), 2, 0)
+        return found
+
+    def _turned_along(self, couples: Array, moment: Array, couple: Array) -> None:
+        """Take couples (elements, p + 1, turns) along flexible members from the ``moment`` (rotations, 3), and from the
+        ``couple`` (places, 3) where they share a rotation with what is rigid, in place.
+        """
+        if not couples.any():
+            return
+        model, three_of = self._model, np.pad(couples, ((0, 0), (0, 0), (3 - couples.shape[2], 0)))
+        turns = model.rotations.turns
+        np.add.at(moment, turns[turns >= 0], -three_of[turns >= 0])
+        told = {(int(turn), int(place)) for group in self._masses.observables if group.at is not None
+                for turn, place in zip(group.turns[:, 0], group.at[:, 0], strict=True)}  # fmt: skip
+        for name in model.members:
+            part = model.elements_of(name)
+            for i, element in ((0, part.start), (-1, part.stop - 1)):
+                place = model.segments.place(model.segments.ends[name, -i])
+                if (int(turns[element, i]), place) in told:
+                    couple[place] -= three_of[element, i]
+
     def loading(
         self, equations: Equations, state: State, loading: Loading, velocity: Array, acceleration: Array
     ) -> Loading:
@@ -158,11 +196,12 @@ class Inertia:
         pull, carried_to = carried(spread, model.segments, model.element)
         # Places carry what is at the ends of elements, along which it is spread nevertheless.
         spread -= self._at_ends(velocity, acceleration)
-        along_members, within = along_rigid(model, self._masses.within, -self._changes(velocity, acceleration))
-        spread, pull = spread + along_members, pull + within
+        masses = self._masses
+        more = along_rigid(model, masses.within.mass, -self._changes(velocity, acceleration))
+        spread, pull = spread + more[0], pull + more[1]
         moment, own = np.zeros_like(loading.moment), on_places.copy()
         couple, jump = loading.couple.copy(), loading.jump.copy()
-        along: list[tuple[Index, Array, Array]] = []
+        along, torque = list[tuple[Index, Array, Array]](), np.zeros_like(loading.torque)
         places = equations.places(state, loading).reshape(system.places, system.axes)
         for group, batch, (begin, end) in zip(self._masses.observables, self._batches, system.ranges, strict=True):
             if group.along is not None:
@@ -171,6 +210,9 @@ class Inertia:
                 continue
             shares = -batch(state.q, places, state.unwrapped, None, forces[begin:end])[3]
             width = system.turns
+            if group.sections is not None and group.turns.shape[1]:
+                torque[group.sections] += shares.reshape(len(shares), -1, width)
+                continue
             for side, turns in enumerate(group.turns.T):
                 used = turns >= 0
                 part = shares[:, width * side : width * (side + 1)]
@@ -183,6 +225,12 @@ class Inertia:
                 used, begin_of = at >= 0, first + system.axes * side
                 np.add.at(own, at[used], shares[used, begin_of : begin_of + system.axes])
         loading = along_elements(model, state.q, loading, along)
+        forces_on = -self._turning(state.q, velocity, acceleration)
+        within, own_couples = (
+            couples_along(model, state.q, spins, forces_on) for spins in (masses.within.spins, masses.spins)
+        )
+        turned_within(model, within, moment, jump)
+        self._turned_along(own_couples, moment, couple)
         return replace(
             loading,
             force=loading.force + own + carried_to,
@@ -193,4 +241,30 @@ class Inertia:
             further=loading.further + moment,
             couple=couple,
             jump=jump,
+            torque=loading.torque + within + own_couples + torque,
+            dampers=self._dampers(torque, forces),
         )
+
+    def _dampers(self, torque: Array, forces: Array) -> Dampers | None:
+        """What of the torque and of the forces (quantities,) is of dampers in sections."""
+        model, weights = self._model, self._model.element.weights
+        moment, scaled, strain = (np.zeros((*torque.shape[:2], 3)) for _ in range(3))
+        if all(group.sections is None for group in self._masses.observables):
+            return None
+        for group, (begin, end) in zip(self._masses.observables, self.system.ranges, strict=True):
+            rows, axes = forces[begin:end], self.system.axes
+            if group.sections is None:
+                continue
+            if not group.turns.shape[1]:
+                scaled.reshape(-1, 3)[group.sections, :axes] = rows.reshape(-1, axes)
+                continue
+            moments = rows.reshape(len(group.data), len(weights), -1) / weights[:, None]
+            if model.space:
+                frames = group.data[:, -9 * len(weights) :].reshape(*moments.shape, 3)
+                moments = np.einsum("nki,nkia->nka", moments, frames)
+            moment[group.sections] = np.pad(moments, ((0, 0), (0, 0), (3 - moments.shape[2], 0)))
+        for name in model.members:
+            part, chosen = model.elements_of(name), model.scene.center_lines[name].strained_axes(model.space)
+            if scaled[part].any():
+                strain[part][..., chosen] = scaled[part][..., : len(chosen)] * strain_units(model, name)
+        return Dampers(torque, moment, strain)

@@ -28,7 +28,7 @@ from .evaluation import UNLOADED, CoreModel, CorePoint, core_model
 from .layout import Layout, layout_of
 from .load_terms import present
 from .loading import Loading
-from .masses import along_rigid, put_moments
+from .masses import along_rigid, couples_along, put_moments, turned_within
 from .model import Model
 from .reactions import Reactions
 from .rotations import RotationFreedom
@@ -688,16 +688,19 @@ class Equations:
             forces = -group(state, u, loading.loads[number], np.zeros(0))[3]
             group.add_forces(forces, moment, force)
             put_moments(at, np.pad(forces[:, :turns], ((0, 0), (3 - turns, 0))), couple, jump)
-        spread, pull = found.spread, found.pull
-        if frame.within.any():
+        spread, pull, torque, within = found.spread, found.pull, found.torque, frame.within
+        if within.mass.any():
             # What rigid members have at their ends is of the first of these groups.
-            pushes = (frame.rest + u) @ loading.loads[frame.groups[0]][0].reshape(u.shape[1], -1)
-            more = along_rigid(self.model, frame.within, pushes)
-            spread, pull = spread + more[0], pull + more[1]
+            matrix = loading.loads[frame.groups[0]][0].reshape(u.shape[1], -1)
+            more = along_rigid(self.model, within.mass, (frame.rest + u) @ matrix)
+            couples = couples_along(self.model, state.q, within.spins, matrix[None])
+            turned_within(self.model, couples, moment, jump)
+            spread, pull, torque = spread + more[0], pull + more[1], torque + couples
         return replace(
             found,
             spread=spread,
             pull=pull,
+            torque=torque,
             moment=found.moment + moment,
             couple=found.couple + couple,
             jump=found.jump + jump,

@@ -416,13 +416,17 @@ class Fields:
         return found
 
     def _branches(self, member: str, x: Array) -> tuple[Array, Array]:
-        """Moments (n, 3), N m, about b1, b2, b3 of what has not yet relaxed, and strains (n, 3) by such forces."""
-        model = self.model
-        found = carried(model, member, self.q, self._placed.y)
-        if found is None:
+        """Moments (n, 3), N m, about b1, b2, b3 of what has not yet relaxed and of dampers, and strains (n, 3) by such
+        forces.
+        """
+        model, dampers, part = self.model, self._loading.dampers, self.model.elements_of(member)
+        parts = [carried(model, member, self.q, self._placed.y)]
+        parts += [] if dampers is None else [(dampers.moment[part], dampers.strain[part])]
+        found = [each for each in parts if each is not None]
+        if not found:
             return np.zeros((len(x), 3)), np.zeros((len(x), 3))
-        at = self._stations(member, x)
-        moment, strain = (np.einsum("np,npa->na", at.at_points, part[at.elements]) for part in found)
+        at, sums = self._stations(member, x), (sum(each[1:], each[0]) for each in zip(*found, strict=True))
+        moment, strain = (np.einsum("np,npa->na", at.at_points, each[at.elements]) for each in sums)
         back = quaternion.conjugate(model.scene.center_lines[member].quaternions(x))
         return quaternion.rotate(back, moment) * model.scales.moment, strain
 
@@ -485,7 +489,7 @@ class Fields:
     def bending(self, member: str, x: Array, curvature: Array) -> tuple[Array, Array]:
         """Largest fibre strain and stress (Pa) by bending, (n,) each, of a member whose section has a shape.
 
-        The curvature that is natural strains no fibre; the stress of a section that relaxes is that of its moment.
+        The curvature that is natural strains no fibre; of what relaxes or is damped the stress is that of the moment.
         ``curvature`` (n, 3) 1/m at fractions x (n,) of the length, as of :meth:`along`.
         """
         scene = self.model.scene
@@ -493,7 +497,7 @@ class Fields:
         change = curvature - scene.center_lines[member].curvatures(x) - self.natural(member, x)
         fibres, largest = section.fibres(x), fibre_strain(section.shape != "rectangle")
         strain = largest(change.T, fibres[:, 1:].T).full().ravel()
-        if not section.relaxation:
+        if not section.relaxation and self._loading.dampers is None:
             return strain, fibres[:, 0] * strain
         # As much as the long-term stiffness would bend under that moment.
         change = change + np.nan_to_num(self._branches(member, x)[0] / section.stiffness(x))
@@ -992,6 +996,8 @@ class Fields:
     def _gained(self, part: slice, pull: Array) -> Array:
         """What the moment gains at the points of elements (elements, points, 3): by forces, less couples along them."""
         torque, gained = self._loading.torque[part], _cross(self.turned[part], pull)
+        if self._loading.dampers is not None:
+            torque = torque - self._loading.dampers.torque[part]
         gained[..., 3 - torque.shape[2] :] -= torque
         return gained
 

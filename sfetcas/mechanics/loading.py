@@ -30,7 +30,26 @@ from .rotations import Rotations
 from .segments import Segments
 from .terms import Group, Term
 
-__all__ = ["Loading", "unit_loadings"]
+__all__ = ["Dampers", "Loading", "unit_loadings"]
+
+
+@dataclass(frozen=True, eq=False)
+class Dampers:
+    """What dampers in sections do at the points of elements, dimensionless: a part of what sections carry.
+
+    Attributes
+    ----------
+    torque : ndarray (elements, points, turns)
+        Their share of :attr:`.Loading.torque`: no couples from outside.
+    moment : ndarray (elements, points, 3)
+        Their moments, fixed axes of the undeformed scene.
+    strain : ndarray (elements, points, 3)
+        The strains of an undamped section by their forces, section axes.
+    """
+
+    torque: Array
+    moment: Array
+    strain: Array
 
 
 @dataclass(frozen=True)
@@ -69,6 +88,8 @@ class Loading:
         The load factor at which they are; of sums and multiples the sum and the multiple.
     before : tuple of ndarray (n, loads)
         Where ``loads`` that turn are evaluated at a state, and so dead: what they were; else empty.
+    dampers : Dampers or None
+        Of the dampers that are among these loads.
     """
 
     force: Array
@@ -86,6 +107,7 @@ class Loading:
     kinds: tuple[Term, ...]
     factor: float
     before: tuple[Array, ...] = ()
+    dampers: Dampers | None = None
 
     def scaled(self, factor: float) -> Loading:
         """All loads and prescribed motions times a factor."""
@@ -196,7 +218,7 @@ class _Sums:
     def loading(self, connections: tuple[Group, ...], factor: float) -> Loading:
         """The sum of all shares."""
         kinds = tuple(group.kind for group in connections)
-        found = Loading(**self.parts, loads=tuple(self.loads), kinds=kinds, factor=factor, before=())
+        found = Loading(loads=tuple(self.loads), kinds=kinds, factor=factor, **self.parts)  # type: ignore[arg-type]
         return found._known(frozenset(self.names), frozenset(self.numbers))
 
 

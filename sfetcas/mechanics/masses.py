@@ -9,7 +9,7 @@ The unit of time is that in which the whole mass is one: ``sqrt(mass length^2 / 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +30,17 @@ from .mass_centers import MassPoints, arms_of
 from .observed import Axes, SpringTravel, Strains, Stretches
 from .terms import Term
 
-__all__ = ["Masses", "Observables", "Turning", "along_rigid", "masses_of", "put_moments"]
+__all__ = [
+    "Masses",
+    "Observables",
+    "Turning",
+    "Within",
+    "along_rigid",
+    "couples_along",
+    "masses_of",
+    "put_moments",
+    "turned_within",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +65,8 @@ class Observables:
         that share a rotation have balances of their own.
     along : tuple (ndarray (n,), ndarray (n, nodes, axes)) or None
         For points that nodes of elements carry the numbers of these elements and the arms.
+    sections : ndarray (n,) or None
+        Of dampers in sections the numbers of their elements, or of their points, those of one element after the other.
     """
 
     kind: Term
@@ -67,6 +79,7 @@ class Observables:
     numbers: Index | None = None
     at: Index | None = None
     along: tuple[Index, Array] | None = None
+    sections: Index | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +102,21 @@ class Turning:
 
 
 @dataclass(frozen=True, eq=False)
+class Within:
+    """What is at the nodes of the elements of straight rigid members.
+
+    Attributes
+    ----------
+    mass : ndarray (elements, p + 1)
+    spins : ndarray (elements, p + 1, 3, 3)
+        Rotary inertia, as of :class:`Masses`.
+    """
+
+    mass: Array
+    spins: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Masses:
     """All masses and dampers of a model.
 
@@ -108,8 +136,8 @@ class Masses:
         What the ends of flexible elements add to ``places`` and ``place_drag``; zero at inner nodes.
     at_ends : ndarray (elements, 2)
         Numbers of these places.
-    within : ndarray (elements, p + 1)
-        Masses of straight rigid members at the nodes of their elements, which ``alone`` has at their ends.
+    within : Within
+        Masses along straight rigid members, which ``alone`` and ``turning`` have as wholes.
     spins : ndarray (elements, p + 1, 3, 3)
         Rotary inertia of the nodes of flexible elements: sums of weight times b b^T over the axes b that turn along.
     turning : Turning
@@ -128,7 +156,7 @@ class Masses:
     ends: Array
     ends_drag: Array
     at_ends: Index
-    within: Array
+    within: Within
     spins: Array
     turning: Turning
     observables: tuple[Observables, ...]
@@ -142,32 +170,71 @@ def put_moments(at: Index | None, moments: Array, couple: Array, jump: Array) ->
         np.add.at(sums, number[number >= 0], moments[number >= 0])
 
 
-def along_rigid(model: Any, within: Array, pushes: Array) -> tuple[Array, Array]:
+def along_rigid(model: Any, mass: Array, pushes: Array) -> tuple[Array, Array]:
     """What masses along straight rigid members add to the distributed forces and to the pull, (elements, p + 1, axes).
 
     Their ends have the forces already: what is added is in balance, and changes section forces between the ends alone.
 
     Parameters
     ----------
-    within : ndarray (elements, p + 1)
-        As of :class:`Masses`.
+    mass : ndarray (elements, p + 1)
+        As of :class:`Within`.
     pushes : ndarray (places, axes)
         Forces on a unit of mass at the places, between which they are linear.
     """
-    spread = np.zeros((*within.shape, pushes.shape[1]))
+    spread = np.zeros((*mass.shape, pushes.shape[1]))
     pull = np.zeros_like(spread)
-    for name, member in model.scene.members.items():
-        if member.type != "rigid" or not within[model.elements_of(name)].any():
-            continue
-        part, cuts, places = model.elements_of(name), model.mesh.cuts[name], model.segments
+    for name, part in _rigid(model, mass):
+        cuts, places = model.mesh.cuts[name], model.segments
         start, end = (pushes[places.place(places.ends[name, i])] for i in range(2))
         x = (cuts[:-1, None] + np.diff(cuts)[:, None] * model.element.nodes)[..., None]
-        forces = within[part][..., None] * ((1.0 - x) * start + x * end)
+        forces = mass[part][..., None] * ((1.0 - x) * start + x * end)
         on_element = forces.sum(axis=1)
         beyond = np.cumsum(on_element[::-1], axis=0)[::-1] - on_element
         at_end = (x * forces).sum(axis=(0, 1))
         spread[part], pull[part] = forces, pull_within(forces, model.element) + (at_end - beyond)[:, None]
     return spread, pull
+
+
+def couples_along(model: Any, q: Array, spins: Array, forces: Array) -> Array:
+    """Couples (elements, p + 1, turns) at the nodes of elements by what acts on axes that turn with them.
+
+    Parameters
+    ----------
+    q : ndarray (rotations, components)
+    spins : ndarray (elements, p + 1, 3, 3)
+        As of :class:`Masses`.
+    forces : ndarray (rotations or 1, axes, axes)
+        Matrices that give the force on a unit of mass from a turned axis.
+    """
+    axes, turns = forces.shape[-1], np.maximum(model.rotations.turns, 0)
+    columns = np.swapaxes(quaternion.turned_by(q[:, None], np.eye(axes)), 1, 2)[turns]
+    spread = np.einsum("ekij,ekjl,ekml->ekim", columns, spins[..., :axes, :axes], columns)
+    across = np.einsum("ekjl,ekml->ekjm", spread, np.broadcast_to(forces, (len(q), axes, axes))[turns])
+    pairs = ((1, 2), (2, 0), (0, 1)) if axes == 3 else ((0, 1),)
+    return np.stack([across[..., j, k] - across[..., k, j] for j, k in pairs], axis=-1)
+
+
+def turned_within(model: Any, couples: Array, moment: Array, jump: Array) -> None:
+    """Take couples (elements, p + 1, turns) along rigid members from the ``moment`` (rotations, 3) on these as wholes,
+    and from the ``jump`` (elements, 3) at their starts, in place.
+    """
+    for name, part in _rigid(model, couples):
+        total = np.pad(couples[part].sum(axis=(0, 1)), (3 - couples.shape[2], 0))
+        moment[int(model.rotations.ends[name][0])] -= total
+        jump[part.start] -= total
+
+
+def _rigid(model: Any, along: Array) -> Iterator[tuple[str, slice]]:
+    """Rigid members along which something is not zero, and their elements."""
+    for name, member in model.scene.members.items():
+        if member.type == "rigid" and along[model.elements_of(name)].any():
+            yield name, model.elements_of(name)
+
+
+def _spread(frames: Array, inertia: Array) -> Array:
+    """Sums (..., 3, 3) of weight times b b^T over section axes, the columns of (..., 3, 3), by moments (..., 3)."""
+    return numbers(np.einsum("...ij,...j,...kj->...ik", frames, euler_weights(inertia), frames))
 
 
 def masses_of(model: Any, *, moving: bool = True) -> Masses:
@@ -199,6 +266,7 @@ class _Weigher:
         # and element with everything else.
         self.spins = np.zeros((*model.beams.weight.shape, 3, 3))
         self.turning: dict[tuple[int, int, int], Array] = {}
+        self.spins_within = np.zeros(self.spins.shape)
         rigid = [name for name, member in self.scene.members.items() if member.type == "rigid"]
         self.rigid = {int(model.rotations.ends[name][0]) for name in rigid}
         self.bodies: dict[str, BodyMass] = {}
@@ -254,7 +322,7 @@ class _Weigher:
             ends=(1.0 - inside) * self.nodal / mass,
             ends_drag=(1.0 - inside) * self.nodal_drag / of_drag,
             at_ends=number.reshape(-1, 2),
-            within=self.within / mass,
+            within=Within(self.within / mass, self.spins_within / of_turning),
             spins=self.spins / of_turning,
             turning=Turning(keys[:, 0], keys[:, 1:], spread),
             observables=tuple(groups),
@@ -289,11 +357,9 @@ class _Weigher:
     # -- members --------------------------------------------------------------------------------
 
     def _add_flexible(self, name: str) -> None:
-        model, element = self.model, self.model.element
+        part, line = self.model.elements_of(name), self.scene.center_lines[name]
         section = self.scene.sections[str(self.scene.members[name].section)]
-        part, cuts, line = model.elements_of(name), model.mesh.cuts[name], self.scene.center_lines[name]
-        x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.nodes
-        weights = line.length * np.diff(cuts)[:, None] * element.weights
+        x, weights = self._nodes(name)
         mass = (section.mass(x.ravel()).reshape(x.shape) + mass_of_tubes(self.scene, name, x)) * weights
         drag = section.drag * weights
         self.total += mass.sum()
@@ -302,8 +368,7 @@ class _Weigher:
         inertia = section.inertia(x.ravel())
         if inertia.any():
             frames = quaternion.matrix(line.quaternions(x.ravel()))
-            parts = euler_weights(inertia * weights.ravel()[:, None])
-            spread = np.einsum("nij,nj,nkj->nik", frames, parts, frames)
+            spread = _spread(frames, inertia * weights.ravel()[:, None])
             self.spins = plus(self.spins, part, spread.reshape(*x.shape, 3, 3))
 
     def _off_line(self, name: str, x: Array, mass: Array, drag: Array) -> tuple[Array, Array]:
@@ -343,19 +408,22 @@ class _Weigher:
         a, b = (self.model.segments.place(self.model.segments.ends[name, i]) for i in range(2))
         for row, column, weight in ((a, a, (1 - x) ** 2), (a, b, x * (1 - x)), (b, a, x * (1 - x)), (b, b, x**2)):
             self._at(row, column, share @ weight)
-        if scene.center_lines[name].turning == 0.0:
-            self.within = plus(self.within, self.model.elements_of(name), self._nodes_along(name, section.mass))
         inertia = (section.inertia(x) * (w * chord.length)[:, None]).sum(axis=0)
-        frame = quaternion.matrix(chord.quaternions(np.array([0.5])))[0]
-        turned = frame @ np.diag(euler_weights(inertia)) @ frame.T
-        self._turn(int(self.model.rotations.ends[name][0]), turned, element=self.model.elements_of(name).start)
+        frame, part = quaternion.matrix(chord.quaternions(np.array([0.5])))[0], self.model.elements_of(name)
+        self._turn(int(self.model.rotations.ends[name][0]), _spread(frame, inertia), element=part.start)
+        if scene.center_lines[name].turning == 0.0:
+            along, weights = self._nodes(name)
+            self.within = plus(self.within, part, section.mass(along.ravel()).reshape(along.shape) * weights)
+            spins = _spread(frame, section.inertia(along.ravel()) * weights.ravel()[:, None])
+            self.spins_within = plus(self.spins_within, part, spins.reshape(*along.shape, 3, 3))
 
-    def _nodes_along(self, name: str, density: Callable[[Array], Array]) -> Array:
-        """Masses (elements, p + 1), kg, of a member at the nodes of its elements."""
+    def _nodes(self, name: str) -> tuple[Array, Array]:
+        """Fractions of the length of a member at the nodes of its elements, and their weights, m, (elements, p + 1)."""
         element, cuts = self.model.element, self.model.mesh.cuts[name]
-        x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.nodes
-        weights = self.scene.center_lines[name].length * np.diff(cuts)[:, None] * element.weights
-        return numbers(density(x.ravel()).reshape(x.shape) * weights)
+        lengths = np.diff(cuts)[:, None]
+        return cuts[:-1, None] + lengths * element.nodes, self.scene.center_lines[
+            name
+        ].length * lengths * element.weights
 
     # -- groups ---------------------------------------------------------------------------------
 
@@ -467,30 +535,37 @@ class _Weigher:
             damping = (delay * weights * chosen / unit).reshape(len(x), -1)
             frames = axes.transpose(0, 2, 1).reshape(len(x), -1)
             data = np.hstack([slopes, frames]) if self.space else slopes
-            groups.append((model.rotations.turns[part], data, damping))
+            groups.append((model.rotations.turns[part], data, damping, np.arange(part.start, part.stop)))
         if not groups:
             return []
-        turns, data, damping = (np.concatenate(part) for part in zip(*groups, strict=True))
-        places = np.zeros((len(turns), 0), dtype=np.intp)
-        return [Observables(Strains(self.space, n), turns, places, data, np.zeros(damping.shape), damping)]
+        turns, data, damping, elements = (np.concatenate(part) for part in zip(*groups, strict=True))
+        places, none = np.zeros((len(turns), 0), dtype=np.intp), np.zeros(damping.shape)
+        return [Observables(Strains(self.space, n), turns, places, data, none, damping, sections=elements)]
 
     def _stretches(self, time: float) -> list[Observables]:
         """Kelvin-Voigt damping of stretch and shear: their energy is half the square of the scaled strains."""
-        model, places, damping = self.model, [np.zeros(0, np.intp)], [np.zeros(0)]
+        model, places, damping, points = self.model, [np.zeros(0, np.intp)], [np.zeros(0)], [np.zeros(0, np.intp)]
         for name in model.members:
-            member = self.scene.members[name]
+            member, part = self.scene.members[name], model.elements_of(name)
             if not member.stretches(self.scene.sections):
                 continue
             delay = self.scene.sections[str(member.section)].damping
             if delay:
-                places.append(model.segments.strains[model.elements_of(name)].ravel())
+                places.append(model.segments.strains[part].ravel())
+                points.append(
+                    np.arange(model.segments.strains.size).reshape(model.segments.strains.shape)[part].ravel()
+                )
                 damping.append(np.full(len(places[-1]), delay / time))
+        return self._strained(places, damping, np.concatenate(points))
+
+    def _strained(self, places: list[Index], damping: list[Array], points: Index | None = None) -> list[Observables]:
+        """Dampers of scaled strains, which are numbered as places."""
         sides, weights = np.concatenate(places)[:, None], np.concatenate(damping)
         if not len(weights):
             return []
-        each = np.repeat(weights[:, None], model.element.axes, axis=1)
+        each = np.repeat(weights[:, None], self.axes, axis=1)
         nothing, data = np.zeros((len(weights), 0), np.intp), np.zeros((len(weights), 0))
-        return [Observables(Stretches(self.space), nothing, sides, data, np.zeros(each.shape), each)]
+        return [Observables(Stretches(self.space), nothing, sides, data, np.zeros(each.shape), each, sections=points)]
 
     def _relaxations(self, time: float) -> list[Observables]:
         """Dampers of the branches in which members relax: their energy is half the square of scaled strains."""
@@ -501,12 +576,7 @@ class _Weigher:
                 own = model.segments.relaxing[:, i, part].ravel()
                 places.append(own[own >= 0])
                 damping.append(np.full(len(places[-1]), branch.time / time))
-        sides, weights = np.concatenate(places)[:, None], np.concatenate(damping)
-        if not len(weights):
-            return []
-        each = np.repeat(weights[:, None], model.element.axes, axis=1)
-        nothing, data = np.zeros((len(weights), 0), np.intp), np.zeros((len(weights), 0))
-        return [Observables(Stretches(self.space), nothing, sides, data, np.zeros(each.shape), each)]
+        return self._strained(places, damping)
 
     def _springs(self, time: float) -> list[Observables]:
         """Dampers beside springs."""

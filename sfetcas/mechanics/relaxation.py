@@ -29,7 +29,7 @@ from .elements import element_by_name
 from .parts import Parts
 from .terms import One, Side, Term, name_of
 
-__all__ = ["Bending", "Straining", "carried", "relax", "relaxations_in"]
+__all__ = ["Bending", "Straining", "carried", "relax", "relaxations_in", "strain_units"]
 
 
 @final
@@ -186,7 +186,7 @@ def carried(model: Any, member: str, q: Array, y: Array) -> tuple[Array, Array] 
     if not model.segments.relaxing.shape[1]:
         return None
     part = model.elements_of(member)
-    weight, unit = model.beams.weight[part], _strain_units(model, member)
+    weight, unit = model.beams.weight[part], strain_units(model, member)
     moment, strain = np.zeros((*weight.shape, 3)), np.zeros((*weight.shape, 3))
     values = np.append(y, 0.0)[model.positions.retained]
     for group in model.connections:
@@ -209,7 +209,7 @@ def carried(model: Any, member: str, q: Array, y: Array) -> tuple[Array, Array] 
     return moment, strain
 
 
-def _strain_units(model: Any, member: str) -> Array:
+def strain_units(model: Any, member: str) -> Array:
     """Strains (elements, points, axes) of a member for scaled strains of one."""
     cuts, line = model.mesh.cuts[member], model.scene.center_lines[member]
     x = cuts[:-1, None] + np.diff(cuts)[:, None] * model.element.points

@@ -22,7 +22,7 @@ import numpy as np
 from ..mathematics.arrays import Array, Index, numbers, plus, values_of
 from .elements import Element
 from .loading import Loading
-from .masses import Masses, masses_of
+from .masses import Masses, Within, masses_of
 from .terms import Group, Side, Term
 
 __all__ = [
@@ -242,8 +242,8 @@ class RotatingFrame:
         Of each of these where its moments act, see :attr:`.Observables.at`.
     rest : ndarray (places, axes)
         Undeformed positions of the places.
-    within : ndarray (elements, p + 1)
-        Masses along straight rigid members, as of :class:`~sfetcas.mechanics.masses.Masses`.
+    within : Within
+        Masses along straight rigid members.
     loading : Loading
         P on everything that has mass; no factor multiplies it.
     """
@@ -252,7 +252,7 @@ class RotatingFrame:
     groups: tuple[int, ...]
     at: tuple[Index | None, ...]
     rest: Array
-    within: Array
+    within: Within
     loading: Loading
 
 
