@@ -68,6 +68,13 @@ def hinged_in_space():
     return load(PROBLEMS / "fourbar_hinges_in_space.toml").to_dict()
 
 
+def turning():
+    """A linkage in space in rotating axes, whose sections have inertia."""
+    table = systems.linked_space()
+    table["sections"]["s"] |= {"rhoA": 0.3, "rhoI": [0.03, 0.02, 0.01]}
+    return {**table, "rotating": [0.3, 0.4, 0.5]}
+
+
 CASES = {
     "tapered": (tapered, TEN),
     "springs": (
@@ -81,6 +88,7 @@ CASES = {
     "turned clamp in space": (clamp_in_space, ["motions.clamp.rotation", "motions.clamp.displacement"]),
     "followers in space": (systems.following_space, None),
     "closings that depend on each other": (hinged_in_space, None),
+    "rotating axes": (turning, ["rotating.0", "rotating.2", "sections.s.rhoA", "sections.s.rhoI.2"]),
 }
 
 

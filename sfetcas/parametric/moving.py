@@ -86,7 +86,8 @@ def parametric_stages(arguments: Arguments, masses: Masses, unilateral: Unilater
     if not _same(masses, found):
         raise SceneError("found numbers that change masses, accepted: loads, motions, stiffness", ("arguments",))
     # Coriolis forces are weights of rates, as masses are of accelerations.
-    if frame is not None and not _alike(frame.omega, np.asarray(model.scene.rotating) * masses.time):
+    given = arguments.scene_at(arguments.defaults).rotating if frame is not None else None
+    if frame is not None and not _alike(frame.omega, np.asarray(given, dtype=float) * masses.time):
         raise SceneError("found numbers that turn the axes, accepted: loads, motions, stiffness", ("arguments",))
     return ParametricStages(arguments, found, unilateral)
 
