@@ -71,8 +71,8 @@ def parametric(
     Raises
     ------
     SceneError
-        A scene with friction where members touch, members that lie along each other, or rotating axes; a number or an
-        answer that it does not have; a number that changes the structure of the model.
+        A scene with friction where members touch, or members that lie along each other; a number or an answer that it
+        does not have; a number that changes the structure of the model.
     """
     check_scene(scene, "parametric({}, ...)", steps=False)
     parameters = [parameters] if isinstance(parameters, str) else parameters
