@@ -44,6 +44,11 @@ __all__ = [
 TURN = 1.2
 """Largest rotation of a node, rad, in a step of :func:`descend` under forces."""
 
+UNFELT = 1e-9
+"""Size of a step, rad and dimensionless, by which no potential changes by more than its rounding, which must not decide
+whether it falls.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
@@ -551,12 +556,12 @@ def descend(
         gaps = np.abs(point.residual[n:]).sum()
         slope = float(point.residual[:n] @ step[:n]) + float(lam @ point.residual[n:]) - penalty * gaps
         slope, before = min(slope, 0.0), point.potential + penalty * gaps
-        share = min(1.0, 4.0 * here.share, most / max(length, TINY))
+        share, far = min(1.0, 4.0 * here.share, most / max(length, TINY)), float(np.abs(step[:n]).max(initial=0.0))
         for _ in range(40):
             trial = equations.moved(here.state, share * step)
             there = at(trial)
             fallen = there.potential + penalty * np.abs(there.residual[n:]).sum() - before
-            if fallen <= 0.3 * (share - 0.5 * share**2) * slope + 1e-12 * abs(before):
+            if share * far <= UNFELT or fallen <= 0.3 * (share - 0.5 * share**2) * slope + 1e-12 * abs(before):
                 break
             share *= 0.5
         return _Downhill(trial, there, length, here.count + 1, share=share)
