@@ -40,7 +40,7 @@ class Dampers:
     Attributes
     ----------
     torque : ndarray (elements, points, turns)
-        Their share of :attr:`.Loading.torque`: no couples from outside.
+        Their share of the ``torque`` of :class:`Loading`: no couples from outside.
     moment : ndarray (elements, points, 3)
         Their moments, fixed axes of the undeformed scene.
     strain : ndarray (elements, points, 3)

@@ -91,7 +91,7 @@ class Turning:
     turns : ndarray (n,)
         Numbers of the rotations.
     at : ndarray (n, 2)
-        Place and element to whose balance of moments they belong, as :attr:`.Observables.at`.
+        Place and element to whose balance of moments they belong, as ``at`` of :class:`Observables`.
     spread : ndarray (n, 3, 3)
         Sums of weight times b b^T over the axes b that turn with them.
     """
@@ -163,7 +163,7 @@ class Masses:
 
 
 def put_moments(at: Index | None, moments: Array, couple: Array, jump: Array) -> None:
-    """Add moments (n, 3), in place and as :attr:`.Observables.at` says, to ``couple`` (places, 3) and ``jump``
+    """Add moments (n, 3), in place and as ``at`` of :class:`Observables` says, to ``couple`` (places, 3) and ``jump``
     (elements, 3).
     """
     for sums, number in () if at is None else zip((couple, jump), at.T, strict=True):

@@ -239,7 +239,7 @@ class RotatingFrame:
         Numbers of the groups of connections that act not along elements: on places, which come first, small members,
         and what turns.
     at : tuple of (ndarray or None)
-        Of each of these where its moments act, see :attr:`.Observables.at`.
+        Of each of these where its moments act, see ``at`` of :class:`~sfetcas.mechanics.masses.Observables`.
     rest : ndarray (places, axes)
         Undeformed positions of the places.
     within : Within
