@@ -220,22 +220,12 @@ def test_a_fit_in_contact_finds_the_stiffness():
         ),
         (pressed_on(DRUM, (0, -20)), ["contacts.d.at"], r"contacts\.d\.at: found 'd', accepted: c"),
         (
-            pressed_on(
-                FLOOR,
-                springs={
-                    "k": {"type": "translational", "node": "B", "direction": [0, 1], "stiffness": 1.0, "stop": [-1, 1]}
-                },
-            ),
-            None,
-            r"contacts\.c: what touches beside stops",
-        ),
-        (
             pressed_on({**FLOOR, "point": [0, -2]}),
             ["contacts.c.at"],
             "touches at 0 places, accepted: one that touches at one",
         ),
     ],
-    ids=["friction", "name", "stops", "nowhere"],
+    ids=["friction", "name", "nowhere"],
 )
 def test_refused(parts, answers, sentence):
     with pytest.raises(SceneError, match=sentence):

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 from scenes import made
+from test_codegen import built, needs_compiler, said
 from test_member_contact import leaves
 
-from sfetcas import SceneError, solve
+from sfetcas import SceneError, export, parametric, solve
+from sfetcas.parametric.arguments import with_values
+from sfetcas.solvers.globalised import Code
 
 FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}
 PEG = {"type": "circle", "center": [0.5, -0.1], "radius": 0.1, "member": "m"}
@@ -163,3 +166,100 @@ def test_friction_beside_what_may_act_or_not_is_refused():
     rough = {"peg": {**PEG, "friction": 0.3}}
     with pytest.raises(SceneError, match=r"contacts\.peg: found friction beside stops"):
         made(beam(**{**BENT, "contacts": rough}, tendons=string(1.5)))
+
+
+# -- as parameters, and in generated C ---------------------------------------------------------------------
+
+PARAMETRIC = {
+    "bars": (
+        lambda: bars(10.0, 3.0),
+        ["f.value.1", "p.value.1"],
+        [(-9, -2.5), (-0.1, -0.5), (-10, -0.2), (-0.1, -0.01)],
+    ),
+    "peg": (lambda: made(beam(**BENT, springs=stopped(-0.2))), ["f.value.1"], [(-2.5,), (-1.0,), (-0.4,), (-4,)]),
+    "string": (lambda: made(beam(**BENT, tendons=string(1.2))), ["f.value.1"], [(-2.5,), (-1,), (-0.3,), (-4,)]),
+    "floor": (
+        lambda: made(beam(**HEAVY, springs=stopped(-0.02), loads=LIFT)),
+        ["f.value.1"],
+        [(1,), (3,), (-1,), (6,)],
+    ),
+    "each other": (lambda: leaves(tendons=string(1.1, "a1")), ["tip.value.1"], [(-2,), (-4,)]),
+}
+LIFT = {"f": {"type": "force", "node": "B", "value": [0, 0.5]}}
+
+
+def told(step, asked):
+    """Answers of statics by their names."""
+    found = {}
+    for name in asked:
+        table, record, key = name.split(".")
+        if table == "nodes":
+            found[name] = step.position(record)
+        elif table == "contacts":
+            found[name] = step.contacts[record]["force"]
+        else:
+            found[name] = step.spring(record).stop if key == "stop" else step.tendon(record)["tension"]
+    return found
+
+
+def asked_of(scene):
+    node = next(node for node, record in reversed(scene.nodes.items()) if record.support == "free")
+    stops = [f"springs.{name}.stop" for name, one in scene.springs.items() if one.stop is not None]
+    tensions = [f"tendons.{name}.tension" for name in scene.tendons]
+    return [f"nodes.{node}.position", *(f"contacts.{name}.force" for name in scene.contacts), *stops, *tensions]
+
+
+@pytest.mark.parametrize("name", ["bars", "peg", "string", "floor"])
+def test_what_touches_and_what_stops_is_found_for_each_number(name):
+    make, numbers, cases = PARAMETRIC[name]
+    scene, changing = make(), [f"loads.{number}" for number in numbers]
+    asked = asked_of(scene)
+    solver, acted = parametric(scene, changing, asked), set()
+    for case in cases:
+        values = dict(zip(changing, case, strict=True))
+        answer, expected = solver.solve(values), told(solve(with_values(scene, values)).last, asked)
+        # The mesh is that of the scene's own numbers, with which places are elsewhere within its elements.
+        for key, value in expected.items():
+            near = 1e-6 if key.startswith("nodes") else 2e-4
+            np.testing.assert_allclose(answer[key], value, atol=near, err_msg=f"{key} at {case}")
+        acted.add(tuple(bool(np.abs(expected[key]).max() > 1e-6) for key in asked[1:]))
+    assert len(acted) > 1
+
+
+@pytest.mark.parametrize("name", ["peg", "string"])
+def test_derivatives_with_both(name):
+    make, numbers, _ = PARAMETRIC[name]
+    scene, number = make(), f"loads.{numbers[0]}"
+    asked = asked_of(scene)
+    solver = parametric(scene, [number], asked)
+    at = solver.solve()
+    there = float(np.squeeze(at.values[number]))
+    ahead, back = (solver.solve({number: there + h}, start=at) for h in (1e-4, -1e-4))
+    for key in asked:
+        slope = (np.asarray(ahead[key]) - back[key]) / 2e-4
+        np.testing.assert_allclose(np.squeeze(at.jacobian[key][number]), slope, atol=1e-6, err_msg=key)
+    assert np.abs(at.jacobian[asked[-1]][number]).max() > 0.1
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["bars", "peg", "string", "each other"])
+def test_both_in_c(name, tmp_path):
+    """The bits of the process, which finds what statics finds, or says that something else touches."""
+    make, numbers, cases = PARAMETRIC[name]
+    scene, changing = make(), [f"loads.{number}" for number in numbers]
+    asked = asked_of(scene)
+    solver = export(scene, tmp_path / "c", name="both", arguments=changing, results=asked)
+    assert "3 of 3 cases agree, 3 of them to the last bit" in said(built(tmp_path / "c", "both"))
+    codes = []
+    for case in cases:
+        outcome, results = solver.solve(np.array(case, dtype=float))
+        codes.append(outcome.code)
+        if outcome.code in (Code.SOLVED, Code.UNSTABLE):
+            expected = told(solve(with_values(scene, dict(zip(changing, case, strict=True)))).last, asked)
+            for key, value in expected.items():
+                near = 1e-6 if key.startswith("nodes") else 2e-4
+                np.testing.assert_allclose(solver.by_name(results)[key], value, atol=near, err_msg=f"{key} at {case}")
+        else:
+            assert outcome.code is Code.TOUCHES
+    assert Code.SOLVED in codes
+    assert (Code.TOUCHES in codes) == (name != "each other")

@@ -63,12 +63,15 @@ class EquilibriumWriter(Writer):
         return self.solver.method.states
 
     @property
+    def _watched(self) -> int:
+        """Number of margins of contacts that are looked at."""
+        return 0 if self.solver.margins is None else int(self.solver.margins.numel_out(0))
+
+    @property
     def _margins(self) -> int:
-        """Number of margins that are looked at, of contacts, or of strings and stops."""
-        margins, switches = self.solver.margins, self.solver.switches
-        if switches is not None:
-            return len(switches)
-        return 0 if margins is None else int(margins.numel_out(0))
+        """Room for margins: of contacts, or of strings and stops."""
+        switches = self.solver.switches
+        return max(self._watched, 0 if switches is None else len(switches))
 
     @property
     def _sizes(self) -> dict[str, int]:
@@ -122,10 +125,10 @@ class EquilibriumWriter(Writer):
     def tables(self) -> list[str]:
         """The core, ranges of arguments, and all that it takes of the model."""
         found = [*self.ranges, *self._tables.texts]
-        constants: dict[str, float] = {**self._tables.constants, "MARGINS": self._margins}
+        constants: dict[str, float] = {**self._tables.constants, "MARGINS": self._watched}
         switches = self.solver.switches
         if switches is not None:
-            numbers = {"SWITCHES": len(switches), "CHOICES": switches.most, "MARGINS": 0}
+            numbers = {"SWITCHES": len(switches), "CHOICES": switches.most}
             constants |= {**numbers, "BEYOND": BEYOND, "ALIKE": tolerances.ALIKE}
             places = {"flag": switches.flags, "multiplier": switches.multipliers, "opening": switches.openings}
             found += [table(f"sf_{name}_of", values, "int") for name, values in places.items()]

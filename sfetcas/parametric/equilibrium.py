@@ -118,6 +118,7 @@ class EquilibriumSolver:
         if self.begun is None or self.start is None:
             return None
         given = self._called(self.prepare, np.append(self.begun, self.arguments.places))
+        given = given if self.switches is None else self.switches.given(given, self.switches.default)
         return self._called(self.arguments.program.row, given), self.start
 
     @functools.cached_property
@@ -447,9 +448,6 @@ def refuse_search(
         if contact.between_members and moving:
             message = f"where members are near to each other is found by a search that is {lacking}"
             raise SceneError(f"{message}, accepted: obstacles", ("contacts", name))
-        if scene.stopped and not moving:
-            message = f"what touches beside stops or tendons that may be slack is {lacking}, accepted: one of these"
-            raise SceneError(message, ("contacts", name))
     for name, spring in scene.springs.items():
         if spring.stop is not None and not stopped:
             message = f"which stops act is found by a search that is {lacking}, {instead}"

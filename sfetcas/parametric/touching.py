@@ -13,17 +13,18 @@ from typing import Any
 from ..contact.kept import Kept
 from ..equilibria.settings import Settings
 from ..equilibria.single import solved_from
-from ..equilibria.statics import solve
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
+from ..mechanics.unilateral import all_stops
 from ..solvers.globalised import Outcome
 from ..solvers.prepared import Prepared, Solved
 from .arguments import Arguments
-from .equilibrium import EquilibriumSolver, in_contact, kept_of, touching_mesh, what_touches
+from .equilibrium import EquilibriumSolver, in_contact, kept_of, solved_steps, touching_mesh, what_touches
 from .results import Results
+from .switched import Switches
 
 __all__ = ["Touching"]
 
@@ -83,7 +84,7 @@ class Touching:
         scene = self.first.arguments.scene_at(numbers)
         static = scene.analysis.model_copy(update={"type": "static", "equilibria": "one"})
         scene = scene.model_copy(update={"analysis": static})
-        answer = solve(scene, self.settings).last
+        answer = solved_steps(scene, self.settings).last
         try:
             mesh = touching_mesh(scene, self.settings, answer, lines=True)
         except SceneError as error:
@@ -103,8 +104,10 @@ class Touching:
             if not mesh.lies and what_touches(solver.model.mesh) == what_touches(mesh):
                 return solver
         first = self.first
-        base = assemble(first.scene, mesh, assembly=first.model.assembly, scales=first.model.scales)  # type: ignore[arg-type]
+        switched = mesh if first.switches is None else replace(mesh, stops=all_stops(first.scene), switched=True)
+        base = assemble(first.scene, switched, assembly=first.model.assembly, scales=first.model.scales)  # type: ignore[arg-type]
         names = [one.name for one in first.results.results]
         results = Results(base, names, first.results.places, unique=first.unique)
         arguments = Arguments(first.scene, base, first.arguments.arguments, results, f"{first.name}_", needed=False)
-        return replace(first, arguments=arguments, results=results, start=None)
+        switches = None if first.switches is None else Switches.of(arguments.program, mesh.stops)
+        return replace(first, arguments=arguments, results=results, start=None, switches=switches)
