@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from scenes import made
-from test_codegen import built, needs_compiler, said
+from test_codegen import needs_compiler
+from test_contact_code import codes_of_both
 from test_member_contact import leaves
 
 from sfetcas import SceneError, export, parametric, solve
@@ -176,6 +177,11 @@ PARAMETRIC = {
         ["f.value.1", "p.value.1"],
         [(-9, -2.5), (-0.1, -0.5), (-10, -0.2), (-0.1, -0.01)],
     ),
+    "peg, free": (
+        lambda: made(beam(**HARDLY, springs=stopped(-0.2))),
+        ["f.value.1"],
+        [(-2.5,), (-1.2,), (-4,), (-0.3,)],
+    ),
     "peg": (lambda: made(beam(**BENT, springs=stopped(-0.2))), ["f.value.1"], [(-2.5,), (-1.0,), (-0.4,), (-4,)]),
     "string": (lambda: made(beam(**BENT, tendons=string(1.2))), ["f.value.1"], [(-2.5,), (-1,), (-0.3,), (-4,)]),
     "floor": (
@@ -185,6 +191,7 @@ PARAMETRIC = {
     ),
     "each other": (lambda: leaves(tendons=string(1.1, "a1")), ["tip.value.1"], [(-2,), (-4,)]),
 }
+HARDLY = {**BENT, "loads": {"f": {"type": "force", "node": "B", "value": [0, -1]}}}
 LIFT = {"f": {"type": "force", "node": "B", "value": [0, 0.5]}}
 
 
@@ -209,7 +216,7 @@ def asked_of(scene):
     return [f"nodes.{node}.position", *(f"contacts.{name}.force" for name in scene.contacts), *stops, *tensions]
 
 
-@pytest.mark.parametrize("name", ["bars", "peg", "string", "floor"])
+@pytest.mark.parametrize("name", ["bars", "peg", "peg, free", "string", "floor"])
 def test_what_touches_and_what_stops_is_found_for_each_number(name):
     make, numbers, cases = PARAMETRIC[name]
     scene, changing = make(), [f"loads.{number}" for number in numbers]
@@ -242,24 +249,33 @@ def test_derivatives_with_both(name):
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["bars", "peg", "string", "each other"])
+@pytest.mark.parametrize("name", ["bars", "peg", "peg, free", "string", "each other"])
 def test_both_in_c(name, tmp_path):
     """The bits of the process, which finds what statics finds, or says that something else touches."""
     make, numbers, cases = PARAMETRIC[name]
     scene, changing = make(), [f"loads.{number}" for number in numbers]
     asked = asked_of(scene)
-    solver = export(scene, tmp_path / "c", name="both", arguments=changing, results=asked)
-    assert "3 of 3 cases agree, 3 of them to the last bit" in said(built(tmp_path / "c", "both"))
-    codes = []
-    for case in cases:
-        outcome, results = solver.solve(np.array(case, dtype=float))
-        codes.append(outcome.code)
-        if outcome.code in (Code.SOLVED, Code.UNSTABLE):
-            expected = told(solve(with_values(scene, dict(zip(changing, case, strict=True)))).last, asked)
-            for key, value in expected.items():
-                near = 1e-6 if key.startswith("nodes") else 2e-4
-                np.testing.assert_allclose(solver.by_name(results)[key], value, atol=near, err_msg=f"{key} at {case}")
-        else:
-            assert outcome.code is Code.TOUCHES
+    solver = export(scene, tmp_path / "c", name="structure", arguments=changing, results=asked)
+    codes = codes_of_both(solver, tmp_path / "c", [[float(x) for x in case] for case in cases])
+    for case, code in zip(cases, codes, strict=True):
+        if code is Code.TOUCHES:
+            continue
+        results = solver.by_name(solver.solve(np.array(case, dtype=float))[1])
+        expected = told(solve(with_values(scene, dict(zip(changing, case, strict=True)))).last, asked)
+        for key, value in expected.items():
+            near = 1e-6 if key.startswith("nodes") else 2e-4
+            np.testing.assert_allclose(results[key], value, atol=near, err_msg=f"{key} at {case}")
     assert Code.SOLVED in codes
     assert (Code.TOUCHES in codes) == (name != "each other")
+
+
+@pytest.mark.parametrize("name", ["peg", "peg, free"])
+def test_arguments_are_followed_from_an_equilibrium(name):
+    """With what acts there, and not what does elsewhere."""
+    make, numbers, _ = PARAMETRIC[name]
+    solver = parametric(make(), [f"loads.{number}" for number in numbers]).solver
+    row, start = solver.followed_from
+    found = solver.method(row, start, warm=True)
+    assert found.code is Code.SOLVED
+    # On the mesh of the answer, whose places are elsewhere within these elements.
+    np.testing.assert_allclose(found.state[solver.switches.multipliers], start[solver.switches.multipliers], atol=1e-4)
