@@ -146,9 +146,9 @@ def test_balance_is_that_of_statics_with_inertia_as_loads(name):
         gaps.append(equations.at(there, system.loading(now)).residual[n:])
     first, second = np.array([1, -8, 0, 8, -1]) / (12 * h), np.array([-1, 16, -30, 16, -1]) / (12 * h**2)
     # Rotations on the curve are exact to the second order in t: central differences see that only.
-    forces = Inertia(system).forces(first @ np.array(x), second @ np.array(x))
-    loading = system.loading(factors[0])
-    loaded = Inertia(system).loading(equations, state, equations.effective(state, loading), forces)
+    rates, changes = first @ np.array(x), second @ np.array(x)
+    effective = equations.effective(state, system.loading(factors[0]))
+    loaded = Inertia(system).loading(equations, state, effective, rates, changes)
     expected = np.concatenate([equations.at(state, loaded).residual[:n], second @ np.array(gaps)])
     # Second differences of rounding, 1e-16 / 1e-8, and their error of the fourth order.
     assert residual(one, state, w, a, factors) == pytest.approx(expected, abs=2e-6 * np.abs(expected).max())
