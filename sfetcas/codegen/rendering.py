@@ -334,15 +334,25 @@ class Writer(abc.ABC):
     def units(self, results: Sequence[Array]) -> Array:
         """Reference (results,) for the comparison of each number in the check, in the unit of the result.
 
-        The largest size of any result of its kind in all cases; 1 for kinds that are zero.
+        The largest size of any result of its kind in all cases, of forces and energies not less than ``FELT`` of the
+        units of the model; 1 for kinds that are zero.
         """
         largest: dict[str, float] = {}
+        for one in self.results.results:
+            if one.unit in ("N", "N m", "J"):
+                largest[one.asked.kind.key or one.name] = FELT * float(self.model.scales.of(one.unit))
         kinds = [kind for one in self.results.results for kind in [one.asked.kind.key or one.name] * one.size]
         for values in results:
             for kind, value in zip(kinds, values.tolist(), strict=True):
                 if np.isfinite(value):
                     largest[kind] = max(largest.get(kind, 0.0), abs(value))
         return np.array([largest.get(kind) or 1.0 for kind in kinds])
+
+
+FELT = 1e-5
+"""Share of the units of the model below which forces are compared as if they were so large: those of what is free of
+stress are rounding, 1e-14 of the units.
+"""
 
 
 def _in_words(names: Sequence[str]) -> str:
