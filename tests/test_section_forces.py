@@ -127,3 +127,22 @@ def test_curvatures_and_strains_of_a_damped_member_are_those_of_its_moments(dime
     np.testing.assert_allclose(found["strain"], fields._strains("m", AT), atol=1e-4 * np.abs(found["strain"]).max())
     # The dampers carry much of it.
     assert np.abs(found["moment"] - found["curvature"])[:, 2].max() > 0.05
+
+
+# -- small members -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_a_stiff_small_member_carries_what_a_stiff_flexible_one_does(dimension):
+    """Its weight, a load that rises along it, and what its end is given."""
+    section = {"EI3": 1e6, "rhoA": 2.0} | ({"EI2": 1e6, "GJ": 1e6} if dimension == "space" else {})
+    loads = {"f": {"type": "force", "node": "B", "value": [0.5, -1.0, 0.7][: 3 if dimension == "space" else 2]}}
+    loads["wind"] = {"type": "distributed", "member": "m", "value": [0, 3.0], "profile": {"polynomial": [0, 1]}}
+    if dimension == "space":
+        loads["c"] = {"type": "moment", "node": "B", "value": [0.3, 0.2, 0.1]}
+    more = {"loads": loads, "gravity": [0, -9.81], "dimension": dimension}
+    small, flexible = (solve(bar(kind, section, **more)).last.along("m", AT) for kind in ("small", "flexible"))
+    # Both bend by 1e-6 of their length.
+    np.testing.assert_allclose(small["force"], flexible["force"], atol=1e-4)
+    np.testing.assert_allclose(small["moment"], flexible["moment"], atol=1e-4)
+    assert np.abs(np.diff(flexible["moment"][:, 2], 2)).max() > 0.5

@@ -8,7 +8,7 @@ first node of a member is minus the gradient of its energy there, and the rest f
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from ..description.records import enumerated
 from ..description.tendons import Stretch
 from ..errors import SolveError, Status
 from ..mathematics import curves, quaternion
-from ..mathematics.arrays import Array, Index, first_of_largest, values_of
+from ..mathematics.arrays import TINY, Array, Index, first_of_largest, values_of
 from ..mathematics.interpolation import differentiation, evaluation
 from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
@@ -870,7 +870,9 @@ class Fields:
         return quaternion.multiply(rotation, self.model.scene.center_lines[member].quaternions(x))
 
     def _along_body(self, member: str, x: Array) -> dict[str, Array]:
-        """Fields of a small member: its ends, and between them the shape of a beam that carries no load."""
+        """Fields of a small member: its ends, and between them the shape of a beam that carries no load, and section
+        forces as if what acts between the ends were spread along the chord, across it linearly and along it evenly.
+        """
         model = self.model
         line, ends = model.scene.center_lines[member], model.rotations.ends[member]
         numbers = [ends[0], ends[-1]]
@@ -895,8 +897,8 @@ class Fields:
             spins[1], chord
         )
         position = rigid[1:-1] + bent[:, None] * miss + hermite
-        wrenches = self.balance.body_ends(member)
-        force, moment = ((1.0 - x)[:, None] * -wrenches[0][k] + x[:, None] * wrenches[-1][k] for k in range(2))
+        wrenches, whole = self.balance.body_ends(member), np.array([rest[0] + moved[0], *position, rest[-1] + moved[1]])
+        force, moment = _between(wrenches[0], wrenches[-1], whole / model.scales.length, x)
         rotation = mixed if model.space else ((1.0 - x) * self.q[ends[0], 0] + x * self.q[ends[-1], 0])[:, None]
         scaled = {"force": force * model.scales.force, "moment": moment * model.scales.moment}
         return {"position": position, "rotation": rotation, **scaled, "curvature": line.curvatures(x)}
@@ -1046,6 +1048,27 @@ def _summed(at: Stations, starts: Array, gained: Array) -> Array:
 
 PARTS = 16
 """Parts of an element between whose ends the largest strain is looked for."""
+
+
+def _between(first: Sequence[Array], last: Sequence[Array], places: Array, x: Array) -> tuple[Array, Array]:
+    """Section forces and moments (n, 3) at fractions x (n,) of a line between two ends, by what is exerted on these.
+
+    Parameters
+    ----------
+    first, last : force (3,) and moment (3,) on the ends
+    places : ndarray (n + 2, 3)
+        Of the start, the stations, and the end.
+    """
+    chord, arms = places[-1] - places[0], places[1:-1] - places[0]
+    total, square = -(first[0] + last[0]), max(float(chord @ chord), TINY)
+    # What acts between is a + b x for the whole line; its first moment about the end by the balance of moments.
+    left = first[1] + last[1] - np.cross(chord, first[0])
+    beyond = 0.5 * (total @ chord) * chord / square + np.cross(left, chord) / square
+    a = 6.0 * beyond - 2.0 * total
+    b = 2.0 * (total - a)
+    s = x[:, None]
+    about = np.cross(arms, first[0]) + np.cross(chord, a * s**2 / 2.0 + b * s**3 / 6.0)
+    return -first[0] - (a * s + b * s**2 / 2.0), about - first[1] + s * (left @ chord) * chord / square
 
 
 def _largest(values: Array) -> float:
