@@ -117,3 +117,20 @@ def hub_at(x):
         "hub": Node(position=[x, 0], support="hinge", inertia=[0, 0, 0.1]),
         "tip": Node(position=[1 + x, 0], mass=0.2),
     }
+
+
+def test_what_has_no_mass_any_more_turns_without_forces():
+    """Numbers with which all mass vanishes are numbers like others, and masses below zero are none."""
+    nodes = {"A": {"position": [0.5, 0], "support": "clamped"}, "B": {"position": [1.5, 0], "mass": 0.2}}
+    table = {"sections": {"s": {"EI3": 1.0}}, "nodes": nodes, "members": {"m": {"nodes": ["A", "B"], "section": "s"}}}
+    loads = {"f": {"type": "force", "node": "B", "value": [0, 0.5]}}
+    table["sections"]["s"]["rhoA"] = 0.0
+    scene = Scene.from_dict({**table, "loads": loads, "rotating": [0, 0, 2.0]})
+    solver = parametric(scene, ["nodes.B.mass"], ["nodes.B.position", "reactions.A.force"])
+    still = solve(Scene.from_dict({**table, "loads": loads})).last
+    np.testing.assert_allclose(solver.solve({"nodes.B.mass": 0.0})["nodes.B.position"], still.position("B"), atol=1e-6)
+    heavy = solver.solve({"nodes.B.mass": 0.4})
+    pulled = 0.4 * 4.0 * heavy["nodes.B.position"]
+    np.testing.assert_allclose(heavy["reactions.A.force"], [-pulled[0], -0.5 - pulled[1], 0.0], rtol=1e-9)
+    with pytest.raises(SceneError, match=r"values\.nodes\.B\.mass: found -1, accepted: zero or more"):
+        solver.solve({"nodes.B.mass": -1.0})

@@ -284,3 +284,12 @@ def test_where_no_choice_holds_nothing_is_written(monkeypatch, tmp_path):
     with pytest.raises(SolveError, match=r"says for the arguments.*no choice of stops and strings"):
         export(made(lever([1.0])), tmp_path / "lever")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["springs.k.stop", "springs.k.stop.0", "springs.k.stop.1"])
+def test_sides_of_a_stop_have_their_signs(name):
+    """As single numbers and as two."""
+    solver = parametric(made(along()), [name], ["nodes.B.position"])
+    wrong, accepted = {"stop": ([0.1, 0.2], "less"), "0": (0.1, "less"), "1": (-0.1, "more")}[name.split(".")[-1]]
+    with pytest.raises(SceneError, match=f"found -?0.1, accepted: zero or {accepted}"):
+        solver.solve({name: wrong})

@@ -17,7 +17,7 @@ from ..description.scene import Scene
 from ..mathematics.arrays import Array
 from ..mathematics.source import functions_in_c, sizes_of, table
 from ..mechanics.model import Model
-from ..parametric.arguments import Arguments
+from ..parametric.arguments import Arguments, limits_of
 from ..parametric.results import Results
 from ..quoting import (
     c_comment,
@@ -175,7 +175,7 @@ class Writer(abc.ABC):
     @property
     def limits(self) -> Array:
         """Least and largest accepted values of all numbers among the arguments, (2, numbers)."""
-        return np.array([one.limits for one in self.arguments.arguments for _ in one.default]).reshape(-1, 2).T
+        return limits_of(self.arguments.arguments)
 
     @property
     def ranges(self) -> list[str]:

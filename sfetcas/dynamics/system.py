@@ -443,7 +443,7 @@ class System(Expressions):
         """Matrix (axes, axes) of ``2 Omega x``, dimensionless, in rotating axes; None in fixed ones."""
         if self.model.rotating_frame is None:
             return None
-        return cross_matrix(2.0 * self.model.rotating_frame.omega)[: self.axes, : self.axes]
+        return cross_matrix(2.0 * self.masses.time * self.model.rotating_frame.omega)[: self.axes, : self.axes]
 
     @functools.cached_property
     def coriolis(self) -> ca.DM | None:

@@ -240,8 +240,9 @@ def _spread(frames: Array, inertia: Array) -> Array:
 def masses_of(model: Any, *, moving: bool = True) -> Masses:
     """The masses of a :class:`~sfetcas.mechanics.model.Model` whose mesh has a place at every end of an element.
 
-    Without ``moving`` section axes, which ``spins`` and ``turning`` tell of, and what has dampers alone are no
-    observables.  Then numbers of the scene may be symbols, but for those on which a small member's inertia depends.
+    Without ``moving`` the unit of mass is 1 kg, and section axes, which ``spins`` and ``turning`` tell of, and what has
+    dampers alone are no observables.  Then numbers of the scene may be symbols, but for those on which a small member's
+    inertia depends, and all masses may vanish with them.
 
     Raises
     ------
@@ -296,7 +297,7 @@ class _Weigher:
         length, moment = model.scales.length, model.scales.moment
         if self.total <= 0.0:
             raise SceneError("nothing has a mass, accepted: a section with rhoA, or a node with mass")
-        mass = self.total
+        mass = self.total if moving else 1.0
         time = np.sqrt(mass / moment) * length
         of_drag = mass / time
         inside = np.ones(self.nodal.shape[1])

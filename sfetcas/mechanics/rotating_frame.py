@@ -234,7 +234,7 @@ class RotatingFrame:
     Attributes
     ----------
     omega : ndarray (3,)
-        Angular velocity times the unit of time of the masses.
+        Angular velocity, rad/s.
     groups : tuple of int
         Numbers of the groups of connections that act not along elements: on places, which come first, small members,
         and what turns.
@@ -266,7 +266,8 @@ def with_rotating_frame(model: Any) -> Any:
     """
     masses = masses_of(model, moving=False)
     axes = model.element.axes
-    omega = numbers(model.scene.rotating) * masses.time
+    speed = numbers(model.scene.rotating)
+    omega = speed * masses.time
     matrix = ((omega @ omega) * np.eye(3) - np.outer(omega, omega))[:axes, :axes]
     rest, inner_rest = _at_rest(model)
     found = _groups(model, masses, rest, inner_rest)
@@ -282,7 +283,7 @@ def with_rotating_frame(model: Any) -> Any:
     loading = replace(empty, loads=(*empty.loads[:before], *here))
     apart = [(before + i, at) for i, (group, at) in enumerate(found) if not group.kind.along_element]
     numbered, at = tuple(i for i, _ in apart), tuple(at for _, at in apart)
-    rotating_frame = RotatingFrame(omega, numbered, at, rest, masses.within, loading)
+    rotating_frame = RotatingFrame(speed, numbered, at, rest, masses.within, loading)
     return replace(model, connections=(*model.connections, *groups), groups=loadings, rotating_frame=rotating_frame)
 
 

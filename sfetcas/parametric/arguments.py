@@ -46,6 +46,7 @@ __all__ = [
     "asked_for",
     "default_arguments",
     "in_words",
+    "limits_of",
     "refuse_idle",
     "single_numbers",
     "with_cuts",
@@ -112,25 +113,15 @@ class Argument:
     numbers: Callable[[float], Mapping[str, ArrayLike]] | None = field(default=None, repr=False)
 
     @property
-    def limits(self) -> tuple[float, float]:
-        """Least and largest accepted value: the range, or what is possible.
+    def limits(self) -> Array:
+        """Least and largest accepted value of each number, (numbers, 2): the range, or what is possible.
 
-        That is above zero for stiffness and radii, from zero for masses and tension, to zero and from zero for the two
-        sides of a stop, anything for others.
+        That is above zero for stiffness and radii, from zero for masses, dampers and tension, to zero and from zero for
+        the two sides of a stop, anything for others.
         """
         if self.low is not None and self.high is not None:
-            return self.low, self.high
-        if self.name.endswith((".stop.0", ".stop.1")):
-            return (-np.inf, 0.0) if self.name.endswith("0") else (0.0, np.inf)
-        entry = (".law." in self.name or ".stretch_law." in self.name) and (
-            self.components is not None or self.name[-1].isdigit()
-        )
-        signed = entry or any(part in self.name for part in SIGNED)
-        of_section = self.name.startswith("sections.") and not signed
-        light = of_section and self.name.split(".")[2] in MAY_BE_ZERO
-        if (of_section and not light) or self.name.endswith(".radius"):
-            return float(np.nextafter(0.0, 1.0)), np.inf
-        return (0.0 if light or self.name.endswith(NOT_NEGATIVE) else -np.inf), np.inf
+            return np.tile([self.low, self.high], (len(self.default), 1))
+        return np.array([_possible(name) for name in self.names]).reshape(-1, 2)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -140,8 +131,22 @@ class Argument:
         return tuple(f"{self.name}.{i}" for i in self.components)
 
 
-NOT_NEGATIVE = (".stiffness", ".tension", ".pressure", ".area")
-"""Ends of the names of numbers that are zero or above."""
+def _possible(name: str) -> tuple[float, float]:
+    """Least and largest possible value of a number by its name."""
+    if name.endswith((".stop.0", ".stop.1")):
+        return (-np.inf, 0.0) if name.endswith("0") else (0.0, np.inf)
+    signed = bool(re.search(r"\.(stretch_)?law\..*\d$", name)) or any(part in name for part in SIGNED)
+    of_section = name.startswith("sections.") and not signed
+    light = of_section and name.split(".")[2] in MAY_BE_ZERO
+    if (of_section and not light) or name.endswith(".radius"):
+        return float(np.nextafter(0.0, 1.0)), np.inf
+    return (0.0 if light or NOT_NEGATIVE.search(name) else -np.inf), np.inf
+
+
+NOT_NEGATIVE = re.compile(
+    r"\.(stiffness|tension|pressure|area)$|^nodes\.[^.]+\.(mass|drag|inertia)(\.\d)?$|^springs\.[^.]+\.damping$"
+)
+"""Names of numbers that are zero or above."""
 
 SIGNED = (".polynomial", ".coupling", ".stiffness.", ".tension_center", ".shear_center", ".mass_center")
 """Parts of the names of numbers of sections that may have either sign."""
@@ -327,7 +332,7 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
         found = _within(scene, found)
     if re.fullmatch(r"motions\.[^.]+\.displacement(\.\d)?", name):
         _check_guide(scene, name)
-    outside = [x for x in found.default if not found.limits[0] <= x <= found.limits[1]]
+    outside = [x for x, (least, most) in zip(found.default, found.limits, strict=True) if not least <= x <= most]
     if outside:
         message = f"found {outside[0]:g} in the scene, accepted: a range from low to high that has it"
         raise SceneError(message, ("arguments", name))
@@ -642,7 +647,7 @@ class Arguments:
 
     @functools.cached_property
     def _limits(self) -> Array:
-        return np.array([one.limits for one in self.arguments for _ in one.default]).reshape(-1, 2).T
+        return limits_of(self.arguments)
 
     # -- the model with symbols -----------------------------------------------------------------------
 
@@ -815,6 +820,11 @@ class Arguments:
         """A function (arguments) -> given, with a name."""
         p = ca.MX.sym("arguments", self.size)
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
+
+
+def limits_of(arguments: Sequence[Argument]) -> Array:
+    """Least and largest accepted values of all numbers of arguments, (2, numbers)."""
+    return np.concatenate([np.zeros((0, 2)), *(one.limits for one in arguments)]).T
 
 
 def refuse_idle(names: Sequence[str]) -> None:

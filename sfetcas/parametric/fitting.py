@@ -25,7 +25,7 @@ from ..description.showing import few, first_lines, notes_in_words, shown
 from ..equilibria.settings import Settings
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import TINY, Array
-from .arguments import Asked, argument
+from .arguments import Asked, argument, limits_of
 from .solving import ParametricAnswer, ParametricEquilibrium, Values, parametric
 
 __all__ = ["Fit", "Fitting", "Measurement", "fit", "fitting"]
@@ -269,7 +269,7 @@ class Fitting:
     def limits(self) -> tuple[Array, Array]:
         """Lower and upper bounds of the fitted numbers, (numbers,) each, in the units of the scene."""
         known = [one for one in self.equilibrium.parameters if one.name in self.parameters]
-        ends = np.array([one.limits for one in known for _ in one.default])
+        ends = limits_of(known).T
         return ends[:, 0], ends[:, 1]
 
     def fit(self, values: ArrayLike | None = None, start: Values | None = None) -> Fit:

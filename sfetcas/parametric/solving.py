@@ -356,11 +356,11 @@ def _given(one: Argument, value: ArrayLike) -> Array:
     if len(given) != count or not np.isfinite(given).all():
         accepted = "a finite number" if count == 1 else f"{count} finite numbers"
         raise SceneError(f"found {value!r}, accepted: {accepted}", ("values", one.name))
-    low, high = one.limits
-    if ((given < low) | (given > high)).any():
-        wrong = given[(given < low) | (given > high)][0]
-        accepted = f"{low:g} to {high:g}" if one.low is not None else "above zero" if low > 0.0 else "zero or more"
-        raise SceneError(f"found {wrong:g}, accepted: {accepted}", ("values", one.name))
+    for number, (low, high) in zip(given.tolist(), one.limits.tolist(), strict=True):
+        if not low <= number <= high:
+            usual = "zero or less" if high == 0.0 else "above zero" if low > 0.0 else "zero or more"
+            accepted = f"{low:g} to {high:g}" if one.low is not None else usual
+            raise SceneError(f"found {number:g}, accepted: {accepted}", ("values", one.name))
     return given
 
 
