@@ -338,14 +338,17 @@ static int sf_corrected(sf_run_of *run, int most, int *negative) {
   sf_look(run, run->here);
   for (count = 0; count < most && run->left && !run->room; ++count) {
     double length;
-    int found;
+    int found, counted;
     --run->left;
     if (!sf_is_finite(run->here->size)) return SF_NOT_FINITE;
     found = sf_newton(run, negative);
+    counted = *negative != SF_BROKEN;
     if (!rules->symmetric) *negative = SF_NOT_DEFINED;
     if (!first && run->here->size <= rules->rounding) return sf_ended(run);
     length = found ? sf_length(run, run->step) : HUGE_VAL;
-    if (!(length <= rules->far) || length > (last > rules->near ? last : rules->near)) return SF_STALLED;
+    if (!(length <= rules->far) || length > (last > rules->near ? last : rules->near))
+      /* What is in balance already needs no step, which rounding alone would make. */
+      return counted && run->here->size <= rules->converged ? sf_ended(run) : SF_STALLED;
     first = 0;
     last = length;
     sf_go(run, 1.0);

@@ -600,13 +600,15 @@ class Globalised:
             self._left -= 1
             if not np.isfinite(here.size):
                 return self._ended(Code.NOT_FINITE, here)
-            step, negative = self._newton(here)
-            negative = negative if self._symmetric else NOT_DEFINED
+            step, counted = self._newton(here)
+            negative = counted if self._symmetric else NOT_DEFINED
             if not first and here.size <= rules.rounding:
                 return self._ended(Code.SOLVED, here, negative)
             length = np.inf if step is None else self._length(step)
             if step is None or not length <= rules.far or length > max(last, rules.near):
-                return self._ended(Code.STALLED, here)
+                # What is in balance already needs no step, which rounding alone would make.
+                balanced = counted != FAILED and here.size <= rules.converged
+                return self._ended(Code.SOLVED, here, negative) if balanced else self._ended(Code.STALLED, here)
             first, last = False, length
             there = self._at(self._moved(here.state, step, 1.0, given), given)
             if here.size <= rules.converged and not there.size <= rules.gain * here.size:
