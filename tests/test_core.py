@@ -738,3 +738,21 @@ def test_bits_do_not_depend_on_the_compiler(flags, library, tmp_path, compiler, 
     subprocess.run(command, check=True)
     other = c._declared(ctypes.CDLL(str(path)))
     assert bits(other, monkeypatch) == bits(library, monkeypatch)
+
+
+@pytest.mark.parametrize("by_core", [True, False])
+def test_what_is_in_balance_needs_no_step(by_core, monkeypatch):
+    """Rounding may have no Newton step that is found; a state that is out of balance needs one."""
+    if not by_core:
+        monkeypatch.setattr(Globalised, "_by_core", lambda *_, **__: None)
+    prepared = Prepared(model_of(EVERYTHING["following"](), 1, 3))
+    inputs = Inputs(prepared.equations)
+    row = inputs.of(prepared.model.loading(1.0))
+    found = Globalised(inputs, prepared.weight, Rules())(row)
+    assert found.code is Code.SOLVED
+    # No solution of a linear system is good enough.
+    strict = Globalised(inputs, prepared.weight, replace(Rules(), left=-1.0))
+    again = strict(row, found.state, warm=True)
+    assert (again.code, again.iterations) == (Code.SOLVED, 1)
+    np.testing.assert_array_equal(again.state, found.state)
+    assert strict(row, found.state + 1e-6, warm=True).code is not Code.SOLVED
