@@ -837,6 +837,8 @@ def refuse_idle(names: Sequence[str]) -> None:
     """
     if names:
         message = "found a number on which nothing depends, accepted: one that the equilibrium depends on"
+        if names[0].startswith("contacts."):
+            message += ", as of what touches with the numbers of the scene"
         raise SceneError(message, ("arguments", names[0]))
 
 
