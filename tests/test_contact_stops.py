@@ -279,3 +279,39 @@ def test_arguments_are_followed_from_an_equilibrium(name):
     assert found.code is Code.SOLVED
     # On the mesh of the answer, whose places are elsewhere within these elements.
     np.testing.assert_allclose(found.state[solver.switches.multipliers], start[solver.switches.multipliers], atol=1e-4)
+
+
+@pytest.mark.parametrize("length", [1.0, 1.2])
+def test_a_choice_that_was_tried_is_not_the_end(length):
+    """A wheel on an arm below a beam: without the string the stop is passed, and with either alone the other one."""
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "C": {"position": [1, 0]},
+            "P": {"position": [0.5, -0.8], "support": "hinge"},
+            "Q": {"position": [0.5, -0.2]},
+        },
+        "members": {"m": {"nodes": ["A", "C"], "section": "s"}, "arm": {"nodes": ["P", "Q"], "type": "rigid"}},
+        "contacts": {"wheel": {"type": "circle", "center": [0.5, -0.2], "radius": 0.15, "node": "Q", "member": "m"}},
+        "springs": {
+            "k": {"node": "P", "stiffness": 0.5, "stop": [-0.3, 0.2]},
+            "z": {"type": "translational", "node": "C", "stiffness": 0, "direction": [0, 1], "stop": [-0.3, 0.3]},
+        },
+        "tendons": {"t": {"way": [{"ground": [-0.3, -0.2]}, {"node": "Q"}], "length": length}},
+        "loads": {
+            "f": {"type": "force", "node": "C", "value": [0, -1.5]},
+            "q": {"type": "force", "node": "Q", "value": [0.3, 0]},
+        },
+        "analysis": {"accuracy": 1e-7},
+    }
+    step = solve(made(table)).last
+    alone = solve(made({key: value for key, value in table.items() if key != "tendons"})).last
+    # The string is slack, and leaves all as it is without.
+    assert step.tendon("t")["slack"]
+    assert step.tendon("t")["length"] == pytest.approx(np.linalg.norm(alone.position("Q") - [-0.3, -0.2, 0]), abs=1e-7)
+    assert step.tendon("t")["length"] < length
+    assert alone.spring("k").travel == pytest.approx(-0.3, abs=1e-12)
+    np.testing.assert_allclose(step.position("C"), alone.position("C"), atol=2e-7)
+    np.testing.assert_allclose(step.contacts["wheel"]["force"], alone.contacts["wheel"]["force"], atol=1e-5)
+    assert alone.contacts["wheel"]["force"][1] > 1.0

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..errors import SceneError, SolveError, Status
+from ..mathematics.arrays import first_of_largest
 from ..mechanics.margins import ROUNDING, margins
 from ..mechanics.unilateral import Stops, Unilateral, switched_over, unilaterals, worst_of
 from .several import alike
@@ -172,6 +173,11 @@ def settled(scene: Scene, answer: Callable[[Stops], Margins], stops: Stops) -> S
         change = next_stops(found, stops)
         if change == stops:
             return stops
+        # Where that has been tried another one that is wrong is switched, the worst, or of those alike the first.
+        wrong = {switched_over(stops, [one]): -margin for one, margin in found.items() if margin < -ROUNDING}
+        others = {choice: by for choice, by in wrong.items() if choice not in tried}
+        if change in tried and others:
+            change = [*others][first_of_largest(np.array([*others.values()]))]
         stops = change
     if first is not None:
         raise first
