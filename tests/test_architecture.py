@@ -127,6 +127,7 @@ ORDER = [
     "mechanics.body_points",
     "mechanics.mass_centers",
     "mechanics.masses",
+    "mechanics.inertia_loads",
     "mechanics.rotating_frame",
     "mechanics.spots",
     "mechanics.model",

@@ -13,10 +13,10 @@ from ..mathematics.linear import SparseMap
 from ..mechanics.balance import three
 from ..mechanics.batches import GroupBatch
 from ..mechanics.equations import Equations, State
+from ..mechanics.inertia_loads import along_rigid, couples_along, put_moments, turned_within
 from ..mechanics.load_terms import carried
 from ..mechanics.loading import Dampers, Loading
 from ..mechanics.mass_centers import along_elements
-from ..mechanics.masses import along_rigid, couples_along, put_moments, turned_within
 from ..mechanics.relaxation import strain_units
 from ..mechanics.terms import rotation_gradient
 from .stages import StageEquations

@@ -25,10 +25,10 @@ from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import CoreSystem, SparseSolver
 from .batches import GroupBatch, at_rest
 from .evaluation import UNLOADED, CoreModel, CorePoint, core_model
+from .inertia_loads import along_rigid, couples_along, put_moments, turned_within
 from .layout import Layout, layout_of
 from .load_terms import present
 from .loading import Loading
-from .masses import along_rigid, couples_along, put_moments, turned_within
 from .model import Model
 from .reactions import Reactions
 from .rotations import RotationFreedom
