@@ -170,9 +170,9 @@ members.NAME.dissipated | J | | statics, motion | since it was undeformed, of on
 members.NAME.largest_bending_strain | | | statics, motion | along the whole member
 members.NAME.largest_bending_stress | Pa | | statics, motion | along the whole member
 springs.NAME.angle | rad | | all | of a rotational one, counting turns
-springs.NAME.moment | N m | | all | of a rotational one
+springs.NAME.moment | N m | | all | of a rotational one, without what its damper takes
 springs.NAME.travel | m | | all | of a translational one
-springs.NAME.force | N | | all | of a translational one
+springs.NAME.force | N | | all | of a translational one, without what its damper takes
 springs.NAME.stop | N m, N | | statics, motion, parameters | of one with a stop: what that adds; zero away from it
 tendons.NAME.tension | N | | all | below zero where it pushes, as a chamber
 tendons.NAME.length | m | | all | along its way
