@@ -13,7 +13,7 @@ from ..mathematics.linear import SparseMap
 from ..mechanics.balance import three
 from ..mechanics.batches import GroupBatch
 from ..mechanics.equations import Equations, State
-from ..mechanics.inertia_loads import along_rigid, couples_along, put_moments, turned_within
+from ..mechanics.inertia_loads import along_rigid, couples_along, put_moments, without_rigid
 from ..mechanics.load_terms import carried
 from ..mechanics.loading import Dampers, Loading
 from ..mechanics.mass_centers import along_elements
@@ -130,19 +130,20 @@ class Inertia:
 
     # -- as loads ---------------------------------------------------------------------------------------
 
-    def _changes(self, velocity: Array, acceleration: Array) -> Array:
-        """Accelerations of the places, (places, axes), with those of Coriolis."""
-        system = self.system
-        rates, changes = (self._split(each)[0][: system.places] for each in (velocity, acceleration))
-        return changes if system.crossing is None else changes + rates @ system.crossing.T
+    def _felt(self, rates: Array, changes: Array) -> Array:
+        """Accelerations (..., axes) of vectors with those of Coriolis, from their rates of the same shape."""
+        crossing = self.system.crossing
+        return changes if crossing is None else changes + rates @ crossing.T
 
-    def _at_ends(self, velocity: Array, acceleration: Array) -> Array:
-        """Inertia and damping forces of the ends of elements, (elements, p + 1, axes), zero at inner nodes."""
-        system, masses, changes = self.system, self._masses, self._changes(velocity, acceleration)
-        rates = self._split(velocity)[0]
-        found = np.zeros((*masses.ends.shape, system.axes))
+    def _at_ends(self, rates: Array, felt: Array) -> Array:
+        """Inertia and damping forces of the ends of elements, (elements, p + 1, axes), zero at inner nodes.
+
+        Velocities and accelerations are those of the places, (places, axes).
+        """
+        masses = self._masses
+        found = np.zeros((*masses.ends.shape, self.system.axes))
         for k, at in zip((0, -1), masses.at_ends.T, strict=True):
-            found[:, k] = masses.ends[:, k, None] * changes[at] + masses.ends_drag[:, k, None] * rates[at]
+            found[:, k] = masses.ends[:, k, None] * felt[at] + masses.ends_drag[:, k, None] * rates[at]
         return found
 
     def _turning(self, q: Array, velocity: Array, acceleration: Array) -> Array:
@@ -154,7 +155,7 @@ class Inertia:
             shape = len(group.data), group.kind.vectors, system.axes
             axes = quaternion.turned_by(q[group.turns], group.data.reshape(shape))
             rates, changes = (each[begin:end].reshape(shape) for each in (velocity, acceleration))
-            changes = changes if system.crossing is None else changes + rates @ system.crossing.T
+            changes = self._felt(rates, changes)
             if system.axes == 3:
                 found[group.turns[:, 0]] = np.einsum("nia,nib->nab", changes, axes)
                 continue
@@ -163,7 +164,7 @@ class Inertia:
             found[group.turns[:, 0]] = np.moveaxis(np.array([[along, -across], [across, along]]), 2, 0)
         return found
 
-    def _turned_along(self, couples: Array, moment: Array, couple: Array) -> None:
+    def _without_flexible(self, couples: Array, moment: Array, couple: Array) -> None:
         """Take couples (elements, p + 1, turns) along flexible members from the ``moment`` (rotations, 3), and from the
         ``couple`` (places, 3) where they share a rotation with what is rigid, in place.
         """
@@ -171,7 +172,7 @@ class Inertia:
             return
         model, three_of = self._model, np.pad(couples, ((0, 0), (0, 0), (3 - couples.shape[2], 0)))
         turns = model.rotations.turns
-        np.add.at(moment, turns[turns >= 0], -three_of[turns >= 0])
+        np.add.at(moment, turns, -three_of)
         told = {(int(turn), int(place)) for group in self._masses.observables if group.at is not None
                 for turn, place in zip(group.turns[:, 0], group.at[:, 0], strict=True)}  # fmt: skip
         for name in model.members:
@@ -195,9 +196,10 @@ class Inertia:
         spread[self._inside] = inner
         pull, carried_to = carried(spread, model.segments, model.element)
         # Places carry what is at the ends of elements, along which it is spread nevertheless.
-        spread -= self._at_ends(velocity, acceleration)
-        masses = self._masses
-        more = along_rigid(model, masses.within.mass, -self._changes(velocity, acceleration))
+        masses, (rates, changes) = self._masses, (self._split(each)[0] for each in (velocity, acceleration))
+        felt = self._felt(rates, changes)[: system.places]
+        spread -= self._at_ends(rates, felt)
+        more = along_rigid(model, masses.rigid.mass, -felt)
         spread, pull = spread + more[0], pull + more[1]
         moment, own = np.zeros_like(loading.moment), on_places.copy()
         couple, jump = loading.couple.copy(), loading.jump.copy()
@@ -226,11 +228,11 @@ class Inertia:
                 np.add.at(own, at[used], shares[used, begin_of : begin_of + system.axes])
         loading = along_elements(model, state.q, loading, along)
         forces_on = -self._turning(state.q, velocity, acceleration)
-        within, own_couples = (
-            couples_along(model, state.q, spins, forces_on) for spins in (masses.within.spins, masses.spins)
+        rigid, flexible = (
+            couples_along(model, state.q, spins, forces_on) for spins in (masses.rigid.spins, masses.spins)
         )
-        turned_within(model, within, moment, jump)
-        self._turned_along(own_couples, moment, couple)
+        without_rigid(model, rigid, moment, jump)
+        self._without_flexible(flexible, moment, couple)
         return replace(
             loading,
             force=loading.force + own + carried_to,
@@ -241,7 +243,7 @@ class Inertia:
             further=loading.further + moment,
             couple=couple,
             jump=jump,
-            torque=loading.torque + within + own_couples + torque,
+            torque=loading.torque + rigid + flexible + torque,
             dampers=self._dampers(torque, forces),
         )
 

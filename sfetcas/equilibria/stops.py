@@ -2,7 +2,8 @@
 
 Each load factor is solved by itself.  Of the active stops whose reaction has the wrong sign the worst is released;
 where there is none, of the stops that are violated the worst is activated; until no reaction has the wrong sign and no
-stop is violated.  An active stop is a constraint, and its multiplier is the reaction of the stop.
+stop is violated.  Where the worst one leads back to a choice that was tried, the next worst takes its place.  An active
+stop is a constraint, and its multiplier is the reaction of the stop.
 
 A tendon of given length is such a constraint too: its multiplier is its tension.  It begins as taut, of those that
 would push the one that pushes most becomes slack, and a slack one that is longer than its free length is taut again.

@@ -22,6 +22,7 @@ import numpy as np
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers
 from .elements import Element
+from .mesh import within_elements
 from .parts import Parts
 from .terms import Discrete, One, Side, Term
 
@@ -95,7 +96,7 @@ class NaturalCurvature(Term):
 def points_of(parts: Parts, member: str) -> Array:
     """Fractions (elements, points) of a member's length of its integration points."""
     cuts = parts.mesh.cuts[member]
-    return numbers(cuts[:-1, None] + np.diff(cuts)[:, None] * parts.element.points)
+    return within_elements(cuts, parts.element.points)
 
 
 def actuations_in(parts: Parts) -> Iterator[One]:

@@ -25,7 +25,7 @@ from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import CoreSystem, SparseSolver
 from .batches import GroupBatch, at_rest
 from .evaluation import UNLOADED, CoreModel, CorePoint, core_model
-from .inertia_loads import along_rigid, couples_along, put_moments, turned_within
+from .inertia_loads import along_rigid, couples_along, put_moments, without_rigid
 from .layout import Layout, layout_of
 from .load_terms import present
 from .loading import Loading
@@ -688,13 +688,13 @@ class Equations:
             forces = -group(state, u, loading.loads[number], np.zeros(0))[3]
             group.add_forces(forces, moment, force)
             put_moments(at, np.pad(forces[:, :turns], ((0, 0), (3 - turns, 0))), couple, jump)
-        spread, pull, torque, within = found.spread, found.pull, found.torque, frame.within
-        if within.mass.any():
+        spread, pull, torque, rigid = found.spread, found.pull, found.torque, frame.rigid
+        if rigid.mass.any():
             # What rigid members have at their ends is of the first of these groups.
             matrix = loading.loads[frame.groups[0]][0].reshape(u.shape[1], -1)
-            more = along_rigid(self.model, within.mass, (frame.rest + u) @ matrix)
-            couples = couples_along(self.model, state.q, within.spins, matrix[None])
-            turned_within(self.model, couples, moment, jump)
+            more = along_rigid(self.model, rigid.mass, (frame.rest + u) @ matrix)
+            couples = couples_along(self.model, state.q, rigid.spins, matrix[None])
+            without_rigid(self.model, couples, moment, jump)
             spread, pull, torque = spread + more[0], pull + more[1], torque + couples
         return replace(
             found,

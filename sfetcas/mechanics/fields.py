@@ -33,7 +33,7 @@ from .load_terms import pull_within
 from .loading import Loading
 from .magnetism import magnet_terms
 from .memory import dissipated_along
-from .mesh import ContactPoint
+from .mesh import ContactPoint, within_elements
 from .relaxation import carried, relax
 from .segments import SAME_CUT, beside_line, pulled_place, standing
 from .singles import fibre_strain
@@ -406,7 +406,7 @@ class Fields:
         """Strains along b1, b2, b3 (n, 3) as the points of the elements say at fractions x."""
         model, part = self.model, self.model.elements_of(member)
         cuts, weight = model.mesh.cuts[member], model.beams.weight[part]
-        there = cuts[:-1, None] + np.diff(cuts)[:, None] * model.element.points
+        there = within_elements(cuts, model.element.points)
         section = model.scene.sections[str(model.scene.members[member].section)]
         axes = model.scene.center_lines[member].strained_axes(model.space)
         compliance = section.compliance(there.ravel())[:, axes].reshape(*there.shape, -1) * model.scales.force
@@ -509,7 +509,7 @@ class Fields:
         It is taken from samples within the elements and from parabolas through three neighbouring samples.
         """
         cuts = self.model.mesh.cuts[member]
-        x = np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * np.arange(PARTS) / PARTS).ravel(), cuts[-1])
+        x = np.append(within_elements(cuts, np.arange(PARTS) / PARTS).ravel(), cuts[-1])
         strain, stress = self.bending(member, x, self.along(member, x)["curvature"])
         return _largest(strain), _largest(stress)
 
@@ -1111,7 +1111,7 @@ def strained_like(target: Any, y: Array, source: Any, values: Array) -> None:
         if not member.stretches(target.scene.sections):
             continue
         part, cuts = target.elements_of(name), target.mesh.cuts[name]
-        x = cuts[:-1, None] + np.diff(cuts)[:, None] * target.element.points
+        x = within_elements(cuts, target.element.points)
         at, own = Stations(source.element, source.mesh.cuts[name], x.ravel()), source.elements_of(name)
         # Scaled strains grow with the root of the length that a point stands for.
         there = scaled_strains(source, values)[own] / np.sqrt(source.beams.weight[own])[..., None]

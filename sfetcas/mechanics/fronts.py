@@ -16,6 +16,7 @@ from ..mathematics.hysteresis import lasting, stiffness
 from ..mathematics.potentials import derivatives_of
 from .fields import Fields, rotations_along
 from .laws import law_of
+from .mesh import within_elements
 
 __all__ = ["front_errors", "section_axes"]
 
@@ -53,7 +54,7 @@ def front_errors(fields: Fields) -> tuple[Array, Array, Array]:
         if law is None or not law.remembers:
             continue
         cuts = model.mesh.cuts[name]
-        x = (cuts[:-1, None] + np.diff(cuts)[:, None] * points).ravel()
+        x = within_elements(cuts, points).ravel()
         own, balanced, soft = _inelastic(fields, name, x)
         shape = (len(cuts) - 1, len(points), own.shape[1])
         turned = np.diff(cuts)[:, None] * line.length

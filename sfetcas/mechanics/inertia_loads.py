@@ -14,8 +14,9 @@ import numpy as np
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
 from .load_terms import pull_within
+from .mesh import within_elements
 
-__all__ = ["along_rigid", "couples_along", "put_moments", "turned_within"]
+__all__ = ["along_rigid", "couples_along", "put_moments", "without_rigid"]
 
 
 def put_moments(at: Index | None, moments: Array, couple: Array, jump: Array) -> None:
@@ -35,7 +36,7 @@ def along_rigid(model: Any, mass: Array, pushes: Array) -> tuple[Array, Array]:
     Parameters
     ----------
     mass : ndarray (elements, p + 1)
-        As of :class:`~sfetcas.mechanics.masses.Within`.
+        As of :class:`~sfetcas.mechanics.masses.RigidMasses`.
     pushes : ndarray (places, axes)
         Forces on a unit of mass at the places, between which they are linear.
     """
@@ -44,7 +45,7 @@ def along_rigid(model: Any, mass: Array, pushes: Array) -> tuple[Array, Array]:
     for name, part in _rigid(model, mass):
         cuts, places = model.mesh.cuts[name], model.segments
         start, end = (pushes[places.place(places.ends[name, i])] for i in range(2))
-        x = (cuts[:-1, None] + np.diff(cuts)[:, None] * model.element.nodes)[..., None]
+        x = within_elements(cuts, model.element.nodes)[..., None]
         forces = mass[part][..., None] * ((1.0 - x) * start + x * end)
         on_element = forces.sum(axis=1)
         beyond = np.cumsum(on_element[::-1], axis=0)[::-1] - on_element
@@ -64,7 +65,7 @@ def couples_along(model: Any, q: Array, spins: Array, forces: Array) -> Array:
     forces : ndarray (rotations or 1, axes, axes)
         Matrices that give the force on a unit of mass from a turned axis.
     """
-    axes, turns = forces.shape[-1], np.maximum(model.rotations.turns, 0)
+    axes, turns = forces.shape[-1], model.rotations.turns
     columns = np.swapaxes(quaternion.turned_by(q[:, None], np.eye(axes)), 1, 2)[turns]
     spread = np.einsum("ekij,ekjl,ekml->ekim", columns, spins[..., :axes, :axes], columns)
     across = np.einsum("ekjl,ekml->ekjm", spread, np.broadcast_to(forces, (len(q), axes, axes))[turns])
@@ -72,7 +73,7 @@ def couples_along(model: Any, q: Array, spins: Array, forces: Array) -> Array:
     return np.stack([across[..., j, k] - across[..., k, j] for j, k in pairs], axis=-1)
 
 
-def turned_within(model: Any, couples: Array, moment: Array, jump: Array) -> None:
+def without_rigid(model: Any, couples: Array, moment: Array, jump: Array) -> None:
     """Take couples (elements, p + 1, turns) along rigid members from the ``moment`` (rotations, 3) on these as wholes,
     and from the ``jump`` (elements, 3) at their starts, in place.
     """

@@ -24,7 +24,7 @@ from .bodies import Lever, body_of, lever_along, quadrature
 from .connections import freedoms
 from .elements import Element
 from .load_terms import carried, cut_of, inner_cut
-from .mesh import Mesh
+from .mesh import Mesh, within_elements
 from .parts import Parts
 from .rotations import Rotations
 from .segments import Segments
@@ -262,7 +262,7 @@ class _Writer:
     def places(self, member: str) -> Array:
         """Fractions of the length of the integration points of a member, (elements, points)."""
         cuts = self.mesh.cuts[member]
-        return numbers(cuts[:-1, None] + np.diff(cuts)[:, None] * self.element.points)
+        return within_elements(cuts, self.element.points)
 
     def terms(self, name: str, chosen: Callable[[Term], bool]) -> Iterator[tuple[int, int, Term]]:
         """Group, number in it, and kind of the terms of a name whose kind is chosen."""

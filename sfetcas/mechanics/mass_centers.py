@@ -28,6 +28,7 @@ from ..mathematics.arrays import Array, Index, numbers
 from .elements import Element
 from .load_terms import carried
 from .loading import Loading
+from .mesh import within_elements
 from .parts import Parts
 from .terms import Discrete, One, Side, Term
 
@@ -156,7 +157,7 @@ def center_weights_in(parts: Parts) -> Iterator[One]:
         if element.gauss:
             raise SceneError("centres of mass off the line need integration at the nodes, found Gauss integration")
         cuts, first = parts.mesh.cuts[name], parts.beams.first[name]
-        x = numbers(cuts[:-1, None] + np.diff(cuts)[:, None] * element.points)
+        x = within_elements(cuts, element.points)
         mass = scene.sections[str(member.section)].mass(x.ravel())
         lever = (mass[:, None] * arms_of(scene, name, x.ravel()))[:, : element.axes].reshape(*x.shape, -1)
         kind, unit = CentredWeight(element.space, element.order + 1), parts.scales.length / parts.scales.moment

@@ -26,10 +26,11 @@ from .bodies import body_of
 from .body_masses import BodyMass, body_mass, euler_weights
 from .body_points import BodyPoints, points_of
 from .mass_centers import MassPoints, arms_of
+from .mesh import within_elements
 from .observed import Axes, SpringTravel, Strains, Stretches
 from .terms import Term
 
-__all__ = ["Masses", "Observables", "Turning", "Within", "masses_of"]
+__all__ = ["Masses", "Observables", "RigidMasses", "RotaryInertia", "masses_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +73,8 @@ class Observables:
 
 
 @dataclass(frozen=True, eq=False)
-class Turning:
-    """Rotary inertia of what is no flexible member.
+class RotaryInertia:
+    """That of what is no flexible member.
 
     Attributes
     ----------
@@ -91,8 +92,8 @@ class Turning:
 
 
 @dataclass(frozen=True, eq=False)
-class Within:
-    """What is at the nodes of the elements of straight rigid members.
+class RigidMasses:
+    """Masses and rotary inertia at the nodes of the elements of straight rigid members.
 
     Attributes
     ----------
@@ -125,11 +126,11 @@ class Masses:
         What the ends of flexible elements add to ``places`` and ``place_drag``; zero at inner nodes.
     at_ends : ndarray (elements, 2)
         Numbers of these places.
-    within : Within
-        Masses along straight rigid members, which ``alone`` and ``turning`` have as wholes.
+    rigid : RigidMasses
+        What is along straight rigid members, which ``alone`` and ``rotary`` have as wholes.
     spins : ndarray (elements, p + 1, 3, 3)
         Rotary inertia of the nodes of flexible elements: sums of weight times b b^T over the axes b that turn along.
-    turning : Turning
+    rotary : RotaryInertia
         The same of nodes and rigid members.
     observables : tuple of Observables
         Section axes, strains, springs, points of small members.
@@ -145,9 +146,9 @@ class Masses:
     ends: Array
     ends_drag: Array
     at_ends: Index
-    within: Within
+    rigid: RigidMasses
     spins: Array
-    turning: Turning
+    rotary: RotaryInertia
     observables: tuple[Observables, ...]
 
 
@@ -159,7 +160,7 @@ def _spread(frames: Array, inertia: Array) -> Array:
 def masses_of(model: Any, *, moving: bool = True) -> Masses:
     """The masses of a :class:`~sfetcas.mechanics.model.Model` whose mesh has a place at every end of an element.
 
-    Without ``moving`` the unit of mass is 1 kg, and section axes, which ``spins`` and ``turning`` tell of, and what has
+    Without ``moving`` the unit of mass is 1 kg, and section axes, which ``spins`` and ``rotary`` tell of, and what has
     dampers alone are no observables.  Then numbers of the scene may be symbols, but for those on which a small member's
     inertia depends, and all masses may vanish with them.
 
@@ -242,9 +243,9 @@ class _Weigher:
             ends=(1.0 - inside) * self.nodal / mass,
             ends_drag=(1.0 - inside) * self.nodal_drag / of_drag,
             at_ends=number.reshape(-1, 2),
-            within=Within(self.within / mass, self.spins_within / of_turning),
+            rigid=RigidMasses(self.within / mass, self.spins_within / of_turning),
             spins=self.spins / of_turning,
-            turning=Turning(keys[:, 0], keys[:, 1:], spread),
+            rotary=RotaryInertia(keys[:, 0], keys[:, 1:], spread),
             observables=tuple(groups),
         )
 
@@ -341,9 +342,7 @@ class _Weigher:
         """Fractions of the length of a member at the nodes of its elements, and their weights, m, (elements, p + 1)."""
         element, cuts = self.model.element, self.model.mesh.cuts[name]
         lengths = np.diff(cuts)[:, None]
-        return cuts[:-1, None] + lengths * element.nodes, self.scene.center_lines[
-            name
-        ].length * lengths * element.weights
+        return within_elements(cuts, element.nodes), self.scene.center_lines[name].length * lengths * element.weights
 
     # -- groups ---------------------------------------------------------------------------------
 
@@ -418,7 +417,7 @@ class _Weigher:
         rest = np.zeros(arms.shape)
         for name in model.members:
             part, line, cuts = model.elements_of(name), self.scene.center_lines[name], model.mesh.cuts[name]
-            x = cuts[:-1, None] + np.diff(cuts)[:, None] * model.element.nodes
+            x = within_elements(cuts, model.element.nodes)
             places = line.positions(x.ravel())[:, :axes].reshape(*x.shape, axes) / length
             own = np.flatnonzero((elements >= part.start) & (elements < part.stop))
             rest = plus(rest, own, (places - places[:, :1])[elements[own] - part.start])
@@ -439,7 +438,7 @@ class _Weigher:
             if not delay:
                 continue
             cuts, part = model.mesh.cuts[name], model.elements_of(name)
-            x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.nodes
+            x = within_elements(cuts, element.nodes)
             section = self.scene.sections[str(member.section)]
             stiffness = section.stiffness(x.ravel())
             chosen = stiffness if self.space else stiffness[:, 1:2] if line.bending_axis == 2 else stiffness[:, 2:3]

@@ -38,6 +38,7 @@ __all__ = [
     "every_other",
     "first_mesh",
     "uniform_mesh",
+    "within_elements",
 ]
 
 
@@ -445,6 +446,12 @@ def breaks_of(scene: Scene, member: str) -> Array:
     places = sorted(places)
     keep = [a for a, b in zip(places, places[1:], strict=False) if b - a > tolerances.DECIMAL]
     return np.array([*keep, 1.0])
+
+
+def within_elements(cuts: Array, shares: Array) -> Array:
+    """Fractions (elements, n) of the length of a member at shares (n,) of its elements, which end at ``cuts``."""
+    found: Array = cuts[:-1, None] + np.diff(cuts)[:, None] * shares
+    return found
 
 
 def every_other(scene: Scene, member: str, cuts: Array) -> Array:

@@ -33,7 +33,7 @@ from .load_terms import loads_in
 from .loading import Loading, unit_loadings
 from .magnetism import magnets_in
 from .mass_centers import center_weights_in
-from .mesh import Mesh
+from .mesh import Mesh, within_elements
 from .parts import Parts
 from .positions import Assembly, Positions, place_nodes
 from .pressure import is_pressure
@@ -282,7 +282,7 @@ class Model:
         if member not in self.mesh.cuts:
             return np.array([0.0, 1.0])
         cuts = self.mesh.cuts[member]
-        inner = cuts[:-1, None] + np.diff(cuts)[:, None] * self.element.nodes[:-1]
+        inner = within_elements(cuts, self.element.nodes[:-1])
         return np.append(inner.ravel(), 1.0)
 
     def factors(self, factor: float) -> dict[str | None, float]:

@@ -26,6 +26,7 @@ from ..description.relaxation import shares_of
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers, values_of
 from .elements import element_by_name
+from .mesh import within_elements
 from .parts import Parts
 from .terms import One, Side, Term, name_of
 
@@ -127,7 +128,7 @@ def _roots(parts: Parts, name: str) -> Array:
     scene, element, scales = parts.scene, parts.element, parts.scales
     cuts, line = parts.mesh.cuts[name], scene.center_lines[name]
     section = scene.sections[str(scene.members[name].section)]
-    x = (cuts[:-1, None] + np.diff(cuts)[:, None] * element.points).ravel()
+    x = within_elements(cuts, element.points).ravel()
     length = (line.length / scales.length * np.diff(cuts))[:, None]
     weights = np.sqrt(((element.weights / length) / (scales.moment * scales.length)).ravel())
     size = len(cuts) - 1, len(element.points), element.turns, element.turns
@@ -212,7 +213,7 @@ def carried(model: Any, member: str, q: Array, y: Array) -> tuple[Array, Array] 
 def strain_units(model: Any, member: str) -> Array:
     """Strains (elements, points, axes) of a member for scaled strains of one."""
     cuts, line = model.mesh.cuts[member], model.scene.center_lines[member]
-    x = cuts[:-1, None] + np.diff(cuts)[:, None] * model.element.points
+    x = within_elements(cuts, model.element.points)
     section = model.scene.sections[str(model.scene.members[member].section)]
     compliance = section.compliance(x.ravel())[:, line.strained_axes(model.space)] * model.scales.force
     weight = model.beams.weight[model.elements_of(member)]

@@ -22,7 +22,8 @@ import numpy as np
 from ..mathematics.arrays import Array, Index, numbers, plus, values_of
 from .elements import Element
 from .loading import Loading
-from .masses import Masses, Within, masses_of
+from .masses import Masses, RigidMasses, masses_of
+from .mesh import within_elements
 from .terms import Group, Side, Term
 
 __all__ = [
@@ -229,7 +230,7 @@ class CentrifugalSpin(Term):
 
 @dataclass(frozen=True, eq=False)
 class RotatingFrame:
-    """The rotation of the axes of a model, and its centrifugal terms; dimensionless.
+    """The rotation of the axes of a model, and its centrifugal terms; dimensionless but for the speed.
 
     Attributes
     ----------
@@ -242,7 +243,7 @@ class RotatingFrame:
         Of each of these where its moments act, see ``at`` of :class:`~sfetcas.mechanics.masses.Observables`.
     rest : ndarray (places, axes)
         Undeformed positions of the places.
-    within : Within
+    rigid : RigidMasses
         Masses along straight rigid members.
     loading : Loading
         P on everything that has mass; no factor multiplies it.
@@ -252,7 +253,7 @@ class RotatingFrame:
     groups: tuple[int, ...]
     at: tuple[Index | None, ...]
     rest: Array
-    within: Within
+    rigid: RigidMasses
     loading: Loading
 
 
@@ -283,7 +284,7 @@ def with_rotating_frame(model: Any) -> Any:
     loading = replace(empty, loads=(*empty.loads[:before], *here))
     apart = [(before + i, at) for i, (group, at) in enumerate(found) if not group.kind.along_element]
     numbered, at = tuple(i for i, _ in apart), tuple(at for _, at in apart)
-    rotating_frame = RotatingFrame(speed, numbered, at, rest, masses.within, loading)
+    rotating_frame = RotatingFrame(speed, numbered, at, rest, masses.rigid, loading)
     return replace(model, connections=(*model.connections, *groups), groups=loadings, rotating_frame=rotating_frame)
 
 
@@ -294,7 +295,7 @@ def _at_rest(model: Any) -> tuple[Array, Array]:
     inner = np.zeros((*model.beams.weight.shape, axes))
     for name in model.members:
         cuts, line, part = model.mesh.cuts[name], scene.center_lines[name], model.elements_of(name)
-        x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.nodes
+        x = within_elements(cuts, element.nodes)
         inner = plus(inner, part, line.positions(x.ravel())[:, :axes].reshape(*x.shape, axes))
     where = {name: numbers(node.position)[:axes] for name, node in scene.nodes.items()}
     where |= {place: where[scene.members[name].nodes[i]] for (name, i), place in segments.ends.items()}
@@ -342,11 +343,11 @@ def _groups(model: Any, masses: Masses, rest: Array, inner_rest: Array) -> list[
         add(CentrifugalVectors(space, group.kind), (group.turns, group.places), data, "body", group.at, elements)
     if not space:
         return found
-    heavy, turning = np.flatnonzero(values_of(masses.spins).any(axis=(1, 2, 3))), masses.turning
+    heavy, rotary = np.flatnonzero(values_of(masses.spins).any(axis=(1, 2, 3))), masses.rotary
     if len(heavy):
         sides = model.rotations.turns[heavy], np.zeros((len(heavy), 0), np.intp)
         add(CentrifugalSpin(space, n), sides, joined(masses.spins[heavy]), "sections of element", elements=heavy)
-    if len(turning.turns):
-        sides = turning.turns[:, None], np.zeros((len(turning.turns), 0), np.intp)
-        add(CentrifugalSpin(space, 1), sides, joined(turning.spread), "inertia", turning.at)
+    if len(rotary.turns):
+        sides = rotary.turns[:, None], np.zeros((len(rotary.turns), 0), np.intp)
+        add(CentrifugalSpin(space, 1), sides, joined(rotary.spread), "inertia", rotary.at)
     return found

@@ -34,6 +34,7 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index, numbers, values_of
 from ..mathematics.interpolation import legendre_tail
 from .elements import Element
+from .mesh import within_elements
 from .parts import Parts
 from .stations import Stations
 from .terms import ALWAYS, ARGUMENTS, One, Side, Term, name_of
@@ -268,7 +269,7 @@ def _data(parts: Parts, tube: Tube, run: Run, part: slice) -> Array:
     """Data (elements, numbers) of :class:`TubeAlong` along a run."""
     element, line, first = parts.element, parts.scene.center_lines[run.member], parts.beams.first[run.member]
     cuts = parts.mesh.cuts[run.member][part.start - first : part.stop - first + 1]
-    x = numbers(cuts[:-1, None] + np.diff(cuts)[:, None] * element.points)
+    x = within_elements(cuts, element.points)
     length = np.diff(cuts) * line.length
     own = numbers(run.begin + x * line.length)
     stiffness = parts.scene.sections[tube.section].stiffness_matrix(values_of(own / tube.length).ravel().clip(0.0, 1.0))
@@ -365,7 +366,7 @@ def angles_like(target: Any, y: Array, source: Any, values: Array) -> None:
             if run.member in nodal:
                 cuts, first = target.mesh.cuts[run.member], target.beams.first[run.member]
                 cuts = cuts[part.start - first : part.stop - first + 1]
-                x = (cuts[:-1, None] + np.diff(cuts)[:, None] * target.element.nodes).ravel()
+                x = within_elements(cuts, target.element.nodes).ravel()
                 found = angles_along(source, name, run.member, x, there)[0].reshape(places.shape)
                 last = float(nodal[run.member][-1, -1])
             else:

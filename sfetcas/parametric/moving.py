@@ -86,9 +86,10 @@ def parametric_stages(arguments: Arguments, masses: Masses, unilateral: Unilater
     if not _same(masses, found):
         raise SceneError("found numbers that change masses, accepted: loads, motions, stiffness", ("arguments",))
     # Coriolis forces are weights of rates, as masses are of accelerations.
-    given = arguments.scene_at(arguments.defaults).rotating if frame is not None else None
-    if frame is not None and not _alike(frame.omega, np.asarray(given, dtype=float)):
-        raise SceneError("found numbers that turn the axes, accepted: loads, motions, stiffness", ("arguments",))
+    if frame is not None:
+        given = np.asarray(arguments.scene_at(arguments.defaults).rotating, dtype=float)
+        if not _alike(frame.omega, given):
+            raise SceneError("found numbers that turn the axes, accepted: loads, motions, stiffness", ("arguments",))
     return ParametricStages(arguments, found, unilateral)
 
 

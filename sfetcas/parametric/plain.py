@@ -32,7 +32,7 @@ from ..mechanics.accuracy import WITHIN, gain, remaining
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import transferred
 from ..mechanics.inputs import Inputs
-from ..mechanics.mesh import Mesh, breaks_of
+from ..mechanics.mesh import Mesh, breaks_of, within_elements
 from ..mechanics.model import Model, assemble
 from ..mechanics.stations import Stations
 from ..solvers.continuation import FARTHEST, TRAVEL, plain_way
@@ -445,7 +445,7 @@ class _Level:
             if member.type != "flexible":
                 continue
             part, cuts = model.elements_of(name), mesh.cuts[name]
-            within = (cuts[:-1, None] + np.diff(cuts)[:, None] * WITHIN).ravel()
+            within = within_elements(cuts, WITHIN).ravel()
             at = Stations(model.element, model.mesh.cuts[name], np.append(within, cuts[-1]))
             count = part.stop - part.start
             own = gained[:, part.start * n : part.stop * n]

@@ -17,6 +17,7 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, State, turned_tangents
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
+from ..mechanics.mesh import within_elements
 from ..mechanics.tendon_shares import stretches_of
 
 __all__ = ["SHARED", "SMALLEST", "shared", "stretches"]
@@ -113,7 +114,7 @@ def _axial(equations: Equations, state: State, loading: Loading, loose: Array, r
             cuts, part = model.mesh.cuts[name], model.elements_of(name)
             # Within the elements, as a tendon may begin or end between two of them.
             within = np.clip(model.element.points, INSIDE, 1.0 - INSIDE)
-            x = cuts[:-1, None] + np.diff(cuts)[:, None] * within
+            x = within_elements(cuts, within)
             found[part] = fields.taken(name, x.ravel()).reshape(*x.shape, 3)
         return np.asarray((found[chosen][..., : model.element.axes] * along).sum(axis=2).ravel())
 
