@@ -429,7 +429,7 @@ class MemberContact:
         if not found.converged:
             return None
         idle = {i for i, pushed in zip(free, system.pushed(found.state).tolist(), strict=True) if not pushed}
-        pressed = Solved(prepared, **found._asdict())
+        pressed = Solved(prepared, *found)
         # Where those that slide are now: from there their pushes go on.
         kept = [
             self._freed(pressed.fields, point, ()) if len(point.members) == 2 and i in free else point
@@ -1200,7 +1200,7 @@ class MemberContact:
         slides = {f"{p.place(side)}, arc length" for p in found.model.mesh.points for side in range(len(p.members))}
         still = np.array([name in slides for name in found.model.positions.unknowns], dtype=bool)
         state = replace(state, y=np.where(still, found.state.y, state.y))
-        return replace(found, state=state, point=prepared.equations.at(state, loading))
+        return replace(found, state=state, known=None)
 
     def notes(self, begin: float, end: float) -> tuple[str, ...]:
         """What is said of the last way, between two factors."""

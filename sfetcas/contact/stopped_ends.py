@@ -166,7 +166,7 @@ class StoppedEnds:
 
     def _corrected(self, system: OneSided, near: State, limits: Limits) -> Solved:
         with np.errstate(over="ignore", invalid="ignore"):
-            return Solved(self.prepared, **correct(system, near, limits=limits)._asdict())
+            return Solved(self.prepared, *correct(system, near, limits=limits))
 
     def _without(self, state: State) -> State:
         return transferred(self.prepared.model, state, self.free.model)

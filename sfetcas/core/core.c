@@ -7,6 +7,7 @@
 #include "newton.c"
 #include "follow.c"
 #include "afar.c"
+#include "trace.c"
 #include "motion.c"
 #include "pivots.c"
 
@@ -31,11 +32,13 @@ int sf_sizes(int *sizes) {
   sizes[14] = (int)sizeof(sf_rules);
   sizes[15] = (int)sizeof(sf_sought);
   sizes[16] = (int)sizeof(sf_inputs);
-  sizes[17] = (int)sizeof(sf_stretch);
-  sizes[18] = (int)sizeof(sf_observables);
-  sizes[19] = (int)sizeof(sf_motion);
-  sizes[20] = (int)sizeof(sf_advance_of);
-  sizes[21] = (int)sizeof(sf_flat);
-  sizes[22] = SF_OPERATIONS;
+  sizes[17] = (int)sizeof(sf_curve);
+  sizes[18] = (int)sizeof(sf_told_of);
+  sizes[19] = (int)sizeof(sf_stretch);
+  sizes[20] = (int)sizeof(sf_observables);
+  sizes[21] = (int)sizeof(sf_motion);
+  sizes[22] = (int)sizeof(sf_advance_of);
+  sizes[23] = (int)sizeof(sf_flat);
+  sizes[24] = SF_OPERATIONS;
   return 0;
 }

@@ -11,7 +11,7 @@
 #ifndef SFETCAS_CORE_H
 #define SFETCAS_CORE_H
 
-#define SF_VERSION 8
+#define SF_VERSION 9
 
 #ifdef _WIN32
 #define SF_PUBLIC __declspec(dllexport)
@@ -315,6 +315,38 @@ SF_PUBLIC int sf_follow(const sf_model *model, sf_system *system, sf_way *way, c
 SF_PUBLIC int sf_solve_cases(const sf_model *model, sf_system *system, sf_cases *cases, const sf_way *way,
                              const sf_limits *limits, const sf_limits *near_limits, const sf_count_of *count,
                              sf_point *point, double *memory);
+
+/* ---- curves of equilibria ------------------------------------------------------------------------------ */
+
+/* What is told of a point of a curve. */
+typedef struct {
+  double factor, arc, residual, first, second;
+  int iterations, negative, doubtful;
+} sf_told_of;
+
+/* A curve, its points so far, and the numbers of sfetcas/solvers/tracing.py and arclength.py that rule its steps. */
+typedef struct {
+  const double *begun, *rate;        /* (given,) at factor 0, and by the factor */
+  const double *metric, *probe;      /* (total,) weights of lengths; a load that answers where an eigenvalue is near zero */
+  const int *column, *line, *entry;  /* of the rows by the unknowns: where columns begin, rows, entries of the matrix */
+  double unit, low, high, stride;    /* of the factor: what counts as a radian, its range, by how much in a step */
+  double longest, shortest;          /* steps, rad or shares of the unit */
+  double turning, sharpest;          /* angle between tangents that is aimed at, cosine of the largest */
+  double far, passing, doubt, effort, roughly, usual;
+  int known, loop;                   /* points before the first one here; how many there are before it may close */
+  int room, points;                  /* points that there is room for; changed: those that there are, one at first */
+  double length;                     /* changed: of the next step */
+  const double *before;              /* changed: (total + 1,) tangent at the point before the last, NULL: none */
+  double arc_before;                 /* changed: its arc length */
+  double *state, *tangent;           /* (room, numbers of a state) and (room, total + 1), the factor last */
+  const double *first;               /* a state */
+  double first_factor;
+  sf_told_of *told;                  /* (room,) */
+} sf_curve;
+
+SF_PUBLIC int sf_trace_size(const sf_model *model);
+SF_PUBLIC int sf_trace(const sf_model *model, sf_system *system, sf_curve *curve, const sf_limits *limits,
+                       const sf_count_of *count, sf_point *point, double *memory, sf_report *report);
 
 /* ---- steps of motions -------------------------------------------------------------------------------- */
 

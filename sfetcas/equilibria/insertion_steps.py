@@ -177,8 +177,7 @@ class _Way:
         prepared = self.steps.prepared(self.factor(beyond))
         loading = prepared.model.loading(self.factor(beyond))
         state = transferred(here.found.model, here.found.state, prepared.model)
-        lost = replace(here.found, prepared=prepared, state=state, loading=loading)
-        lost = replace(lost, point=prepared.equations.at(state, loading))
+        lost = replace(here.found, prepared=prepared, state=state, loading=loading, known=None)
         try:
             there = prepared.switch_branch(lost, loading)
         except SolveError:

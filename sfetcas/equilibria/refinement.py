@@ -422,7 +422,7 @@ def _with_unique_reactions(found: EquilibriumResult) -> EquilibriumResult:
     carried = np.abs(point.residual[: equations.unknowns] - left).max(initial=0.0)
     needed = carried > LOOSE * acting.max(initial=LEAST_SCALE) and carried > np.abs(left).max(initial=0.0)
     if residual <= tolerances.BALANCED and not needed:
-        solved = replace(solved, state=state, point=point, residual=residual)
+        solved = replace(solved, state=state, known=point, residual=residual)
     elif solved.multipliers > BEYOND or needed:
         raise SolveError(Status.STRETCHED, stretched(equations, solved.point, loose), solved.state)
     else:

@@ -27,6 +27,7 @@ __all__ = [
     "Border",
     "Cases",
     "Counting",
+    "Curve",
     "Factors",
     "Flat",
     "Group",
@@ -45,6 +46,7 @@ __all__ = [
     "Sums",
     "System",
     "TapeTable",
+    "Told",
     "Way",
     "core",
     "doubles",
@@ -279,6 +281,32 @@ class Sought(ctypes.Structure):
     _fields_ = (*((name, _int) for name in ("status", "negative", "iterations")), ("residual", _double))
 
 
+class Told(ctypes.Structure):
+    """``sf_told_of``."""
+
+    _fields_ = (
+        *((name, _double) for name in ("factor", "arc", "residual", "first", "second")),
+        *((name, _int) for name in ("iterations", "negative", "doubtful")),
+    )
+
+
+class Curve(ctypes.Structure):
+    """``sf_curve``."""
+
+    _fields_ = (
+        *((name, _pointer) for name in ("begun", "rate", "metric", "probe", "column", "line", "entry")),
+        *((name, _double) for name in ("unit", "low", "high", "stride", "longest", "shortest", "turning", "sharpest")),
+        *((name, _double) for name in ("far", "passing", "doubt", "effort", "roughly", "usual")),
+        *((name, _int) for name in ("known", "loop", "room", "points")),
+        ("length", _double),
+        ("before", _pointer),
+        ("arc_before", _double),
+        *((name, _pointer) for name in ("state", "tangent", "first")),
+        ("first_factor", _double),
+        ("told", _pointer),
+    )
+
+
 class Observables(ctypes.Structure):
     """``sf_observables``."""
 
@@ -335,7 +363,7 @@ class Flat(ctypes.Structure):
     )
 
 
-OF_WAYS = (Counting, Way, Cases, Rules, Sought, Inputs)
+OF_WAYS = (Counting, Way, Cases, Rules, Sought, Inputs, Curve, Told)
 
 HANDED = (TapeTable, Group, Model, Point, Factors, Pivoted, System, Limits, Border, Report, *OF_WAYS)
 
@@ -348,7 +376,7 @@ SIZES = (
 )
 """What the core says of the sizes of what is handed to it, if it is the one that this module was written for."""
 
-VERSION = 8
+VERSION = 9
 """Number of the interface, as ``SF_VERSION``."""
 
 
@@ -450,6 +478,8 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL | None:
     library.sf_follow_size.argtypes = [_pointer]
     library.sf_negative.argtypes = [_pointer] * 5
     library.sf_follow.argtypes = [_pointer] * 10
+    library.sf_trace_size.argtypes = [_pointer]
+    library.sf_trace.argtypes = [_pointer] * 8
     library.sf_solve_cases.argtypes = [_pointer] * 9
     library.sf_find_size.argtypes = [_pointer] * 3
     library.sf_find.argtypes = [*[_pointer] * 5, _int, *[_pointer] * 4]

@@ -20,7 +20,7 @@ import numpy as np
 from .. import tolerances
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array, Index
-from ..mathematics.core import Border, Counting, Limits, Report, Way, doubles
+from ..mathematics.core import Border, Counting, Curve, Limits, Report, Way, doubles, integers
 from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import CoreSystem, SparseSolver
 from .batches import GroupBatch, at_rest
@@ -495,6 +495,16 @@ class Equations:
         there, reached = core.follow(system, _arrays(state), doubles(tangent), way, limits, counting)
         return State(*there), reached
 
+    def traced(self, curve: Curve, limits: Limits, counting: Counting) -> bool | None:
+        """Plain steps along a curve by the core, which are written to it: whether its room is filled.
+
+        None without a core.  Arguments are those of :meth:`.CoreModel.trace`.
+        """
+        if self._with_system is None:
+            return None
+        core, system = self._with_system
+        return core.trace(system, curve, limits, counting)
+
     def for_search(self, varying: Sequence[int]) -> tuple[CoreModel, CoreSystem] | None:
         """The core's model and its system for the globalised Newton method, with data of their own where these vary.
 
@@ -748,6 +758,14 @@ class Equations:
         """Of the entries that are the Jacobian of the constraints their numbers, rows and unknowns, (n,) each."""
         chosen = np.flatnonzero((self.row >= self.unknowns) & (self.column < self.unknowns))
         return chosen, self.row[chosen] - self.unknowns, self.column[chosen]
+
+    @functools.cached_property
+    def jacobian_columns(self) -> tuple[Index, Index, Index]:
+        """The Jacobian of the constraints by unknowns: where those of each begin (unknowns + 1,), rows, and entries."""
+        chosen, row, column = self.jacobian_entries
+        order = np.argsort(column, kind="stable")
+        begins = np.searchsorted(column[order], np.arange(self.unknowns + 1))
+        return integers(begins), integers(row[order]), integers(chosen[order])
 
     def of_rows(self, entries: Array) -> Array:
         """Entries of the Newton matrix that belong to the Jacobian of the constraints; zero in place of all others."""

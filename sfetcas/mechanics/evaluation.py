@@ -650,6 +650,32 @@ class CoreModel:
             system.make_room()
             ctypes.pointer(way)[0] = begun
 
+    def trace(self, system: CoreSystem, curve: c.Curve, limits: c.Limits, counting: c.Counting) -> bool:
+        """Plain steps along a curve, which are written to it, see ``sf_trace``: whether its room is filled.
+
+        Parameters
+        ----------
+        system : CoreSystem
+            Solves for the steps.
+        curve : Curve
+            Changed: its points, and the length of the next step.
+        limits : Limits
+            Of the corrections.
+        counting : Counting
+        """
+        point, report, given = CorePoint(self), c.Report(), (limits, counting)
+        rest = (*map(ctypes.addressof, given), point.address, self._tracing.ctypes.data, ctypes.addressof(report))
+        while True:
+            ended = self.library.sf_trace(self.address, system.address, ctypes.addressof(curve), *rest)
+            if ended != NO_ROOM:
+                return not ended
+            system.make_room()
+
+    @functools.cached_property
+    def _tracing(self) -> Array:
+        """Memory that a curve takes."""
+        return np.zeros(self.library.sf_trace_size(self.address))
+
     def search(
         self, system: CoreSystem, rules: c.Rules, inputs: c.Inputs, varying: Sequence[int], arrays: list[Array]
     ) -> Search:

@@ -581,7 +581,7 @@ class PathTracing:
     @staticmethod
     def _entry(at: Standing, error: float | None, notes: tuple[str, ...]) -> Equilibrium:
         state, point = with_sharing(at.equations, at.state, at.loading, at.point, tolerances.BALANCED, reactions=True)
-        found = replace(at, state=state, point=point, residual=relative_residual(at.equations, point))
+        found = replace(at, state=state, known=point, residual=relative_residual(at.equations, point))
         finite = error if error is not None and np.isfinite(error) else None
         return equilibrium(found, found.stability, error_estimate=finite, notes=notes)
 

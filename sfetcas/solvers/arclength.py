@@ -10,24 +10,27 @@ count a little, multipliers not at all: where a structure carries more load with
 from __future__ import annotations
 
 import copy
+import ctypes
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from .. import tolerances
 from ..errors import SolveError
 from ..mathematics.arrays import TINY, Array, Index
+from ..mathematics.core import Curve as CoreCurve
+from ..mathematics.core import Told
 from ..mechanics.equations import Point, State
 from ..mechanics.loading import Loading
 from ..mechanics.memory import Remembering
 from .between_states import turned_between
 from .neutral import Neutral
-from .newton import Balance, ForCore, Limits, correct
+from .newton import Balance, ForCore, Limits, correct, limits_for_core
 from .one_sided import Border
 from .prepared import Prepared, Solved
-from .redundancy import loose_rows, met, redundant, with_sharing
+from .redundancy import ROUGHLY, loose_rows, met, redundant, usual_square, with_sharing
 from .residuals import relative_residual
 from .sharing import shared
 from .stability import LIGHT, Inertia
@@ -60,6 +63,12 @@ STARTS, BEHIND = 60, 10.0
 
 PLACES = (1.0 / 3.0, 2.0 / 3.0)
 """Places within a step at which it is looked for turning points of what members remember."""
+
+MOST_ROWS = 100
+"""Up to so many rows the core finds whether they depend on each other, which takes the third power of their number."""
+
+AT_ONCE = 32
+"""Points that the core finds in one call, at most."""
 
 HISTORY = 1e-5
 """Step of the differences of loads with histories, share of the unit of the factor: of second order, so 1e-10."""
@@ -332,7 +341,8 @@ class Curve:
 
     def _standing(self, found: Solved, along: Tangent, arc: float) -> Standing:
         tangent, doubtful = self._tangent(found, along)
-        return Standing(**vars(found), tangent=tangent, arc=arc, doubtful=doubtful)
+        known = (getattr(found, part.name) for part in fields(Solved))
+        return Standing(*known, tangent=tangent, arc=arc, doubtful=doubtful)
 
     def predicted(self, start: Standing, length: float, bend: Tangent | None = None) -> tuple[State, float]:
         """State and factor at an arc length from a point: along its tangent, with the curvature ``bend`` if given."""
@@ -411,6 +421,73 @@ class Curve:
         if self.inner(way, b.tangent) > 0.0:
             return b
         return replace(b, tangent=b.tangent.back)
+
+    # -- plain steps ----------------------------------------------------------------------------
+
+    @property
+    def for_steps(self) -> bool:
+        """Whether the core takes plain steps along the curve: of what it knows, and where no point is looked at else."""
+        equations, prepared = self.equations, self.prepared
+        if not equations.by_core or self.for_core is None or prepared.counting is None or self._limited:
+            return False
+        return not self.remembers and equations.rows <= MOST_ROWS and bool(equations.rotation_unknowns)
+
+    def plain_steps(
+        self, rules: CoreCurve, first: Standing, before: Standing | None, now: Standing, most: int
+    ) -> list[Standing]:
+        """Points beyond one, as far as steps are plain, see ``sf_trace``; none where the first step is not.
+
+        Parameters
+        ----------
+        rules : Curve of the core
+            The numbers that rule steps, and the length of the first; that of the next is put there.
+        first, before, now : Standing
+            The first point of all, the one before, None where there is none, and the one from which steps go on.
+        most : int
+            Number of points at most.
+        """
+        equations, given = self.equations, self.for_core
+        counting = self.prepared.counting if self.for_steps else None
+        neutral = now.tangent.neutral is not None or now.inertia.zero > 0
+        if counting is None or given is None or neutral or (equations.rows and redundant(equations, now.point)):
+            return []
+        room, total = 1 + min(most, AT_ONCE), equations.total
+        start, now_state = (np.concatenate([part.ravel() for part in vars(one.state).values()]) for one in (first, now))
+        states, tangents = np.empty((room, len(start))), np.empty((room, total + 1))
+        told = (Told * room)()
+        states[0], tangents[0] = now_state, np.append(now.tangent.z, now.tangent.factor)
+        told[0] = Told(factor=now.factor, arc=now.arc, negative=now.inertia.negative)
+        last = None if before is None else np.append(before.tangent.z, before.tangent.factor)
+        columns, usual = equations.jacobian_columns, usual_square(equations)
+        own = Limits(iterations=ITERATIONS, short=SHORT, turned=TURN, near=tolerances.BALANCED, returns=False)
+        limits, alive = limits_for_core(equations, own, self.prepared.weight)
+        addresses = (part.ctypes.data for part in (*given, self.weight, self._probe, *columns))
+        for name, address in zip(("begun", "rate", "metric", "probe", "column", "line", "entry"), addresses, strict=True):
+            setattr(rules, name, address)
+        rules.unit, rules.passing, rules.doubt, rules.roughly, rules.usual = self.unit, PASSING, DOUBT, ROUGHLY, usual
+        rules.room, rules.points = room, 1
+        rules.before, rules.arc_before = (None, 0.0) if last is None else (last.ctypes.data, before.arc)
+        rules.state, rules.tangent, rules.told = states.ctypes.data, tangents.ctypes.data, ctypes.addressof(told)
+        rules.first, rules.first_factor = start.ctypes.data, first.factor
+        equations.traced(rules, limits, counting[0])
+        del alive
+        return [self._told(*one) for one in zip(told[1 : rules.points], states[1:], tangents[1:], strict=False)]
+
+    def _told(self, told: Told, state: Array, tangent: Array) -> Standing:
+        """A point that the core has found."""
+        found = Standing(
+            self.prepared,
+            self.equations.state(state),
+            self.loading(told.factor),
+            None,
+            *(told.residual, True, told.iterations, told.first, told.second),
+            tangent=Tangent(tangent[:-1], float(tangent[-1])),
+            arc=told.arc,
+            doubtful=bool(told.doubtful),
+        )
+        # It has been counted on the way.
+        vars(found)["inertia"] = Inertia(told.negative, 0)
+        return found
 
     # -- between two points ---------------------------------------------------------------------
 

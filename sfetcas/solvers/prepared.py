@@ -183,7 +183,7 @@ class Prepared:
             Fields of :class:`~sfetcas.solvers.newton.Limits`.
         """
         system = AtLoads(self.equations, loading, self._test.weight, tangent, flat, drag)
-        return Solved(self, **correct(system, state, limits=Limits(**limits))._asdict())
+        return Solved(self, *correct(system, state, limits=Limits(**limits)))
 
     def followed(
         self, begin: Solved, rate: Loading, way: Way, limits: Limits, *, counted: bool
@@ -466,8 +466,10 @@ class Solved:
     Attributes
     ----------
     prepared : Prepared
-    state, loading, point
-        The state, loads and motions, and the equations there.
+    state, loading
+        The state, loads and motions.
+    known : Point or None
+        The equations there, if they have been evaluated.
     residual : float
         Largest out-of-balance entry relative to the scale of the equations, see :mod:`~sfetcas.solvers.residuals`.
     converged : bool
@@ -481,7 +483,7 @@ class Solved:
     prepared: Prepared
     state: State
     loading: Loading
-    point: Point
+    known: Point | None
     residual: float
     converged: bool = True
     iterations: int = 0
@@ -491,7 +493,12 @@ class Solved:
     @classmethod
     def taken(cls, prepared: Prepared, state: State, loading: Loading) -> Solved:
         """A state that is taken for an equilibrium, without looking whether it is one."""
-        return cls(prepared, state, loading, prepared.equations.at(state, loading), 0.0)
+        return cls(prepared, state, loading, None, 0.0)
+
+    @functools.cached_property
+    def point(self) -> Point:
+        """The equations at the state."""
+        return self.equations.at(self.state, self.loading) if self.known is None else self.known
 
     @property
     def balanced(self) -> bool:

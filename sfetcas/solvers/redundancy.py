@@ -18,6 +18,7 @@ from .residuals import relative_residual
 from .sharing import shared
 
 __all__ = [
+    "ROUGHLY",
     "changed_by",
     "independent",
     "loose_rows",
@@ -26,6 +27,7 @@ __all__ = [
     "redundant",
     "rows_in",
     "stretched",
+    "usual_square",
     "with_sharing",
 ]
 
@@ -50,9 +52,7 @@ def loose_rows(equations: Equations, point: Point, slack: float | None = None) -
 
 
 def _loose_rows(equations: Equations, point: Point, slack: float) -> Array:
-    # A usual size of rows, so that a row without derivative is found also if it is the only one.
-    # Without beams rows are of the size of one.
-    usual = float((equations.model.beams.weight**2).sum()) or 1.0
+    usual = usual_square(equations)
     if equations.rows > MANY:
         squares, left, largest = _smallest(equations, point, APART * slack**2, usual)
     else:
@@ -67,6 +67,12 @@ def _loose_rows(equations: Equations, point: Point, slack: float) -> Array:
     changes, count = changed_by(equations, point, small), small.shape[1]
     _, sizes, right = np.linalg.svd(np.pad(changes, ((0, max(0, count - len(changes))), (0, 0))), full_matrices=False)
     return np.asarray(small @ right[sizes < slack * np.sqrt(max(largest, usual))].T)
+
+
+def usual_square(equations: Equations) -> float:
+    """A usual square of a singular value, so that a row without derivative is found also if it is the only one."""
+    # Without beams rows are of the size of one.
+    return float((equations.model.beams.weight**2).sum()) or 1.0
 
 
 def independent(equations: Equations, point: Point, among: Array) -> Array:

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import SolveError
 from ..mathematics.arrays import TINY, Array
+from ..mathematics.core import Curve as CoreCurve
 from ..mechanics.equations import State
 from .arclength import PASSING, Curve, Standing, Tangent
 from .continuation import advanced
@@ -223,7 +224,7 @@ def _leaving(curve: Curve, now: Standing) -> Standing:
     beyond = curve.corrected(*curve.predicted(rest, FINE), rest.tangent)
     if beyond is None:
         return rest
-    return replace(rest, tangent=beyond.tangent, point=beyond.point, doubtful=beyond.doubtful)
+    return replace(rest, tangent=beyond.tangent, known=beyond.point, doubtful=beyond.doubtful)
 
 
 def _with_crossed_folds(traced: Traced, usual: int) -> Traced:
@@ -314,6 +315,8 @@ class _Piece:
     missing: float = np.inf
     missed: float = 0.0
     passed: Callable[[Standing, Standing], bool] | None = None
+    waits: int = 0
+    vain: int = 0
 
     def traced(self) -> Traced:
         """The stretch from its first point on."""
@@ -332,6 +335,9 @@ class _Piece:
 
     def trial(self, now: Standing, length: float) -> tuple[Standing | None, float]:
         """The next point, None if the step is refused, and the length of the next step."""
+        length = self.plainly(now, length)
+        if self.points[-1] is not now:
+            return self.points[-1], length
         curve, length = self.curve, min(length, longest(self.curve, now, self.stride))
         there, left = _ahead(curve, now, self.before, length, self.span)
         if there is not None and self.passed is not None and self.passed(now, there):
@@ -377,6 +383,29 @@ class _Piece:
         self.curve = curve.following(there)
         return there, 0.0 if self.end else length * _growth(curve, now, there)
 
+    def plainly(self, now: Standing, length: float) -> float:
+        """Steps that the core takes by itself, whose points are added, and the length of the next step.
+
+        It takes the decisions of :meth:`trial`, as long as nothing is met and no eigenvalue is near to zero.  Where its
+        first step is not plain it is asked again after as many steps as it has been asked in vain.
+        """
+        if self.watch is not None or self.passed is not None or now is not self.points[-1] or not self.curve.for_steps:
+            return length
+        if self.waits:
+            self.waits -= 1
+            return length
+        rules = core_rules(length, self.span, self.stride, len(self.points) - 1)
+        found = self.curve.plain_steps(rules, self.points[0], self.before, now, self.more)
+        if found:
+            self.before = found[-2] if len(found) > 1 else now
+            self.points += found
+            self.more -= len(found)
+        # The step at which it ended is not plain.
+        full = rules.points == rules.room
+        self.vain = 0 if found else self.vain + 1
+        self.waits = max(self.vain - 1, int(bool(found) and not full))
+        return rules.length
+
     def _within_margins(self, now: Standing, there: Standing) -> Standing | None:
         """The point at the end of a step, or the first one before it at which a margin vanishes; None if not found."""
         self.crossed, watch = (), self.watch
@@ -399,6 +428,27 @@ class _Piece:
         together = first.arc + ONE_EVENT * (there.arc - now.arc)
         self.crossed = tuple(i for i, standing in found.items() if standing.arc <= together)
         return first
+
+
+def core_rules(length: float, span: tuple[float, float], stride: float, known: int) -> CoreCurve:
+    """What rules steps by the core: the length of the first, the range of factors, and by how much one changes these.
+
+    ``known`` is the number of points before the one from which steps go on.
+    """
+    return CoreCurve(
+        low=span[0],
+        high=span[1],
+        stride=stride,
+        longest=STRIDE,
+        shortest=SHORTEST,
+        turning=TURNING,
+        sharpest=np.cos(SHARPEST * TURNING),
+        far=FAR,
+        effort=2.0 ** (EXPECTED + 0.5),
+        known=known,
+        loop=LOOP,
+        length=length,
+    )
 
 
 def _closes(curve: Curve, start: Standing, now: Standing, there: Standing) -> bool:
