@@ -205,6 +205,7 @@ typedef struct {
   const double *begun, *rate; /* (given,) at factor 0, and by the factor */
   const double *row;          /* (total,) weighted direction */
   double unit;                /* its part along the factor */
+  double apart;               /* change of the factor in differences, where not all loads act on nodes; else 0 */
   double passing;             /* relative residual that suffices where gaps are closed; 0: none */
   double factor;              /* changed */
 } sf_border;
@@ -332,7 +333,7 @@ typedef struct {
   double unit, low, high, stride;    /* of the factor: what counts as a radian, its range, by how much in a step */
   double longest, shortest;          /* steps, rad or shares of the unit */
   double turning, sharpest;          /* angle between tangents that is aimed at, cosine of the largest */
-  double far, passing, doubt, effort, roughly, usual;
+  double far, passing, doubt, effort, roughly, usual, apart;
   int known, loop;                   /* points before the first one here; how many there are before it may close */
   int room, points;                  /* points that there is room for; changed: those that there are, one at first */
   double length;                     /* changed: of the next step */

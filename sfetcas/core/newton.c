@@ -10,7 +10,7 @@
 typedef struct {
   sf_state state[3];
   sf_point point[2];
-  double *step, *right, *both, *given, *results, *matrix, *solving;
+  double *step, *right, *both, *given, *ahead, *results, *matrix, *solving;
 } sf_room;
 
 static int sf_make_room(const sf_model *m, double *memory, sf_room *room) {
@@ -31,6 +31,7 @@ static int sf_make_room(const sf_model *m, double *memory, sf_room *room) {
   PART(room->right, 2 * m->total);
   PART(room->both, 2 * m->total);
   PART(room->given, m->given);
+  PART(room->ahead, m->given);
   PART(room->results, m->results);
   PART(room->matrix, m->entry_count);
   PART(room->solving, 4 * m->total);
@@ -97,12 +98,39 @@ static int sf_first_step(const sf_model *m, sf_system *system, const sf_point *p
   return sf_step(m, system, p->entries, p->residual, limits, room);
 }
 
+/* What is given at the factor of a border. */
+static void sf_give(const sf_model *m, const sf_border *border, double factor, double *given) {
+  int i;
+  for (i = 0; i < m->given; ++i) given[i] = border->begun[i] + factor * border->rate[i];
+}
+
+/* The derivative of the residual by the factor, at a state whose point is the one evaluated last.
+ *
+ * The residual is linear in loads.  given (given,) and results are memory.
+ */
+static void sf_rate(const sf_model *m, const sf_border *border, double factor, const sf_state *s, const sf_point *p,
+                    double *slope, double *given, double *results) {
+  sf_point there = *p;
+  sf_work work;
+  int i;
+  if (border->apart == 0.0) {
+    sf_slope(m, s, border->rate, p, slope, results);
+    return;
+  }
+  there.residual = slope;
+  sf_give(m, border, factor + border->apart, given);
+  sf_divide(m, p->work, &work);
+  sf_evaluate(m, s, given, &there);
+  sf_residual(m, s, given, &there, &work);
+  for (i = 0; i < m->total; ++i) slope[i] = (slope[i] - p->residual[i]) / border->apart;
+}
+
 /* Newton's step of all unknowns and of the factor, whose change is *change; the point is the one evaluated last. */
-static int sf_bordered(const sf_model *m, sf_system *system, const sf_border *border, const sf_state *s,
-                       const sf_point *p, const sf_limits *limits, sf_room *room, double *change) {
+static int sf_bordered(const sf_model *m, sf_system *system, const sf_border *border, double factor,
+                       const sf_state *s, const sf_point *p, const sf_limits *limits, sf_room *room, double *change) {
   double *base = room->both, *rate = room->both + m->total, along = 0.0, across = 0.0;
   int i, broken;
-  sf_slope(m, s, border->rate, p, room->right + m->total, room->results);
+  sf_rate(m, border, factor, s, p, room->right + m->total, room->ahead, room->results);
   sf_regularise(m, p->entries, limits, room->matrix);
   for (i = 0; i < m->total; ++i) {
     room->right[i] = -p->residual[i];
@@ -117,12 +145,6 @@ static int sf_bordered(const sf_model *m, sf_system *system, const sf_border *bo
   *change = -along / (across + border->unit);
   for (i = 0; i < m->total; ++i) room->step[i] = base[i] + *change * rate[i];
   return 0;
-}
-
-/* What is given at the factor of a border. */
-static void sf_give(const sf_model *m, const sf_border *border, double factor, double *given) {
-  int i;
-  for (i = 0; i < m->given; ++i) given[i] = border->begun[i] + factor * border->rate[i];
 }
 
 /* Whether a point is accurate enough for its purpose, before rounding is reached. */
@@ -172,7 +194,7 @@ int sf_correct(const sf_model *m, sf_system *system, const double *given, const 
          sf_suffices(m, border, &p[here], residual, limits)))
       break;
     if (border)
-      i = sf_bordered(m, system, border, &s[here], &p[here], limits, &room, &change);
+      i = sf_bordered(m, system, border, factor, &s[here], &p[here], limits, &room, &change);
     else if (count || !tangent)
       i = sf_step(m, system, p[here].entries, p[here].residual, limits, &room);
     else

@@ -14,7 +14,7 @@
 
 /* Where the parts of the memory of a curve begin: that of counting and correcting, two states, and vectors. */
 typedef struct {
-  double *following, *step, *row, *matrix, *right, *both, *results, *solving, *products;
+  double *following, *step, *row, *given, *matrix, *right, *both, *results, *solving, *products;
   sf_state expected, there;
 } sf_along;
 
@@ -26,6 +26,7 @@ static int sf_make_along(const sf_model *m, double *memory, sf_along *along) {
   PART(following, sf_follow_size(m));
   PART(step, m->total);
   PART(row, m->total);
+  PART(given, m->given);
   PART(matrix, m->entry_count);
   PART(right, 2 * m->total);
   PART(both, 2 * m->total);
@@ -107,12 +108,12 @@ static int sf_independent(const sf_model *m, const sf_curve *curve, const double
  *
  * The point is the one evaluated last.  Doubtful says whether an eigenvalue may be near to zero.
  */
-static int sf_tangent(const sf_model *m, sf_system *system, const sf_curve *curve, const sf_limits *limits,
-                      const sf_state *s, const sf_point *p, const double *before, double *tangent, int *doubtful,
-                      sf_along *along) {
+static int sf_tangent(const sf_model *m, sf_system *system, const sf_curve *curve, const sf_border *border,
+                      const sf_limits *limits, const sf_state *s, const sf_point *p, const double *before,
+                      double *tangent, int *doubtful, sf_along *along) {
   double *answer = along->both + m->total, size = 0.0, length;
   int i, broken;
-  sf_slope(m, s, curve->rate, p, along->right, along->results);
+  sf_rate(m, border, border->factor, s, p, along->right, along->given, along->results);
   sf_regularise(m, p->entries, limits, along->matrix);
   for (i = 0; i < m->total; ++i) {
     along->right[i] = -along->right[i];
@@ -182,13 +183,14 @@ int sf_trace(const sf_model *m, sf_system *system, sf_curve *curve, const sf_lim
     border.rate = curve->rate;
     border.row = along.row;
     border.unit = tangent[m->total] / (curve->unit * curve->unit);
+    border.apart = curve->apart;
     border.passing = curve->passing;
     i = sf_correct(m, system, NULL, NULL, &border, limits, &along.there, point, along.following, report);
     if (i == 2) return 2;
     same = !i && report->good;
     if (same) {
       if (m->rows && !sf_independent(m, curve, point->entries, &along)) return 1;
-      i = sf_tangent(m, system, curve, limits, &along.there, point, tangent, beyond, &next->doubtful, &along);
+      i = sf_tangent(m, system, curve, &border, limits, &along.there, point, tangent, beyond, &next->doubtful, &along);
       if (i) return i;
       cosine = sf_inner(m, curve, tangent, beyond);
       same = cosine >= curve->sharpest &&

@@ -201,7 +201,7 @@ class Border(ctypes.Structure):
 
     _fields_ = (
         *((name, _pointer) for name in ("begun", "rate", "row")),
-        *((name, _double) for name in ("unit", "passing", "factor")),
+        *((name, _double) for name in ("unit", "apart", "passing", "factor")),
     )
 
 
@@ -296,7 +296,7 @@ class Curve(ctypes.Structure):
     _fields_ = (
         *((name, _pointer) for name in ("begun", "rate", "metric", "probe", "column", "line", "entry")),
         *((name, _double) for name in ("unit", "low", "high", "stride", "longest", "shortest", "turning", "sharpest")),
-        *((name, _double) for name in ("far", "passing", "doubt", "effort", "roughly", "usual")),
+        *((name, _double) for name in ("far", "passing", "doubt", "effort", "roughly", "usual", "apart")),
         *((name, _int) for name in ("known", "loop", "room", "points")),
         ("length", _double),
         ("before", _pointer),

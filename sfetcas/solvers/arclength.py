@@ -274,9 +274,14 @@ class Curve:
     @functools.cached_property
     def for_core(self) -> tuple[Array, Array] | None:
         """What is given at factor 0 and its rate, for the core; None where loads or equations are not linear in it."""
-        if not self._linear or self._driven or self._steady[0] != 0.0 or not self._steady[1]:
+        if not self._linear or self._driven or self._steady[0] != 0.0:
             return None
         return self.equations.given(self.loading(0.0)), self.equations.given(self.rate(0.0))
+
+    @property
+    def _apart(self) -> float:
+        """Change of the factor in differences by the core, of equations that are linear in loads; 0: no differences."""
+        return 0.0 if self._steady[1] else self.unit
 
     @functools.cached_property
     def _seen(self) -> Index:
@@ -465,7 +470,7 @@ class Curve:
         for name, address in zip(("begun", "rate", "metric", "probe", "column", "line", "entry"), addresses, strict=True):
             setattr(rules, name, address)
         rules.unit, rules.passing, rules.doubt, rules.roughly, rules.usual = self.unit, PASSING, DOUBT, ROUGHLY, usual
-        rules.room, rules.points = room, 1
+        rules.apart, rules.room, rules.points = self._apart, room, 1
         rules.before, rules.arc_before = (None, 0.0) if last is None else (last.ctypes.data, before.arc)
         rules.state, rules.tangent, rules.told = states.ctypes.data, tangents.ctypes.data, ctypes.addressof(told)
         rules.first, rules.first_factor = start.ctypes.data, first.factor
@@ -585,7 +590,7 @@ class _Across:
             return None
         weight = self.primal_factor * self.curve.prepared.weight
         passing = 0.0 if self.sharp else PASSING
-        return ForCore(weight, border=(*given, self.row, self.across.factor / self.curve.unit**2, passing))
+        return ForCore(weight, border=(*given, self.row, self.across.factor / self.curve.unit**2, self.curve._apart, passing))
 
     def suffices(self, here: Balance) -> bool:
         """Whether an intermediate point is accurate enough; its gaps must be closed too, as small ones move much."""

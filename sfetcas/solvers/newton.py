@@ -367,15 +367,15 @@ class ForCore(NamedTuple):
         Loads and motions, of :meth:`.Equations.given`; None where there is a border.
     tangent : ndarray (entries,), optional
         Entries of the matrix for the first step.
-    border : (ndarray, ndarray, ndarray, float, float), optional
-        What is given at factor 0, its rate, the weighted direction (total,), its part along the factor, and the
-        residual that suffices.
+    border : (ndarray, ndarray, ndarray, float, float, float), optional
+        What is given at factor 0, its rate, the weighted direction (total,), its part along the factor, the change of
+        that in differences (0 where loads act on nodes only), and the residual that suffices.
     """
 
     weight: Array
     given: Array | None = None
     tangent: Array | None = None
-    border: tuple[Array, Array, Array, float, float] | None = None
+    border: tuple[Array, Array, Array, float, float, float] | None = None
 
 
 def _by_core(system: System, state: State, factor: float, limits: Limits) -> Converged | None:
@@ -392,9 +392,9 @@ def _by_core(system: System, state: State, factor: float, limits: Limits) -> Con
     controls, alive = limits_for_core(equations, limits, known.weight)
     border = None
     if known.border is not None:
-        begun, rate, row, unit, passing = known.border
+        begun, rate, row, *numbers = known.border
         row = doubles(row)
-        border = Border(begun.ctypes.data, rate.ctypes.data, row.ctypes.data, unit, passing, factor)
+        border = Border(begun.ctypes.data, rate.ctypes.data, row.ctypes.data, *numbers, factor)
     given = known.weight if known.given is None else known.given
     found = equations.corrected(begin, given, controls, tangent=known.tangent, border=border)
     del alive
