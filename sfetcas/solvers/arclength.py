@@ -431,9 +431,9 @@ class Curve:
 
     @property
     def for_steps(self) -> bool:
-        """Whether the core takes plain steps along the curve: of what it knows, and where no point is looked at else."""
+        """Whether the core takes plain steps along the curve."""
         equations, prepared = self.equations, self.prepared
-        if not equations.by_core or self.for_core is None or prepared.counting is None or self._limited:
+        if not equations.by_core or self.for_core is None or prepared.counting is None:
             return False
         return not self.remembers and equations.rows <= MOST_ROWS and bool(equations.rotation_unknowns)
 

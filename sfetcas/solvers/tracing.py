@@ -389,22 +389,32 @@ class _Piece:
         It takes the decisions of :meth:`trial`, as long as nothing is met and no eigenvalue is near to zero.  Where its
         first step is not plain it is asked again after as many steps as it has been asked in vain.
         """
-        if self.watch is not None or self.passed is not None or now is not self.points[-1] or not self.curve.for_steps:
+        if now is not self.points[-1] or not self.curve.for_steps:
             return length
         if self.waits:
             self.waits -= 1
             return length
         rules = core_rules(length, self.span, self.stride, len(self.points) - 1)
         found = self.curve.plain_steps(rules, self.points[0], self.before, now, self.more)
+        full, length = rules.points == rules.room, rules.length
+        for count, (a, b) in enumerate(pairwise([now, *found])):
+            if self._meets(a, b):
+                found, full, length = found[:count], False, b.arc - a.arc
+                break
         if found:
             self.before = found[-2] if len(found) > 1 else now
             self.points += found
             self.more -= len(found)
         # The step at which it ended is not plain.
-        full = rules.points == rules.room
         self.vain = 0 if found else self.vain + 1
         self.waits = max(self.vain - 1, int(bool(found) and not full))
-        return rules.length
+        return length
+
+    def _meets(self, now: Standing, there: Standing) -> bool:
+        """Whether a step leads through something, beyond a margin, or beyond what the scene describes."""
+        through = self.passed is not None and self.passed(now, there)
+        crossed = self.watch is not None and (self.watch(there) < -CROSSED).any()
+        return bool(through or crossed) or self.curve.beyond_limits(there) is not None
 
     def _within_margins(self, now: Standing, there: Standing) -> Standing | None:
         """The point at the end of a step, or the first one before it at which a margin vanishes; None if not found."""
