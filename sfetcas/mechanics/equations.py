@@ -91,8 +91,8 @@ class Point:
         plus a hundredth of its stiffness; 1 for gaps.
     entries : ndarray
         Entries of the Newton matrix, in the order of ``Equations.row`` and ``Equations.column``.
-    rotation_jacobian : ndarray (elements, moments of the nodes, axes)
-        Derivatives of the chords of elements by rotations of their nodes.
+    rotation_jacobian : ndarray (elements, moments of the nodes, axes), optional
+        Derivatives of the chords of elements by rotations of their nodes; the core keeps these to itself.
     """
 
     potential: float
@@ -100,7 +100,7 @@ class Point:
     residual: Array
     scale: Array
     entries: Array
-    rotation_jacobian: Array
+    rotation_jacobian: Array | None = None
 
 
 class Equations:
@@ -439,10 +439,8 @@ class Equations:
     def _point_of(self, found: CorePoint, *, convex: bool = False) -> Point:
         """What the core has evaluated last."""
         assert self._core is not None
-        parts = self._core.parts
-        entries = self._of_parts(parts, convex=True) if convex else found.entries
-        jacobian = parts[0][5].reshape(*self.tables.sides[0].shape, self.model.element.axes).copy()
-        return Point(found.potential, found.stored, found.residual, found.scale, entries, jacobian)
+        entries = self._of_parts(self._core.parts, convex=True) if convex else found.entries
+        return Point(found.potential, found.stored, found.residual, found.scale, entries)
 
     def corrected(
         self,
@@ -593,6 +591,7 @@ class Equations:
         if self._core is not None:
             return self._core.slope(_arrays(state), self.given(rate))
         given, part_of = self.given(rate), self.layout.given
+        assert point.rotation_jacobian is not None
         # Forces at places pull at all segments that lead there.
         parts = [np.einsum("eca,ea->ec", point.rotation_jacobian, self._pulls(given)[:, 0])]
         places = self._retained(state, given)

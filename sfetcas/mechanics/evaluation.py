@@ -42,6 +42,9 @@ __all__ = [
 UNLOADED = 1e-6
 """Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
 
+StateParts = tuple[Array, Array, Array, Array]
+"""Rotations, displacements, multipliers, and values near which angles count, see :class:`~.equations.State`."""
+
 Parts = list[list[Array]]
 """For each group its results, as of :func:`~sfetcas.mechanics.terms.rotation_gradient`, each (n, ...)."""
 
@@ -81,16 +84,11 @@ class CorePoint:
     """
 
     def __init__(self, model: CoreModel) -> None:
-        self.residual, self.scale = np.empty(model.total), np.empty(model.total)
-        self.entries = np.empty(model.entry_count)
-        self._point = c.Point(
-            0.0,
-            0.0,
-            self.residual.ctypes.data,
-            self.scale.ctypes.data,
-            self.entries.ctypes.data,
-            *model.shared,
-        )
+        total = model.total
+        numbers = np.empty(2 * total + model.entry_count)
+        self.residual, self.scale, self.entries = numbers[:total], numbers[total : 2 * total], numbers[2 * total :]
+        begin = numbers.ctypes.data
+        self._point = c.Point(0.0, 0.0, begin, begin + 8 * total, begin + 16 * total, *model.shared)
 
     @property
     def potential(self) -> float:
@@ -512,21 +510,33 @@ class CoreModel:
 
     # -- calls ----------------------------------------------------------------------------------------
 
-    def _state(self, q: Array, y: Array, lam: Array, unwrapped: Array) -> tuple[c.State, tuple[Array, ...]]:
-        arrays = tuple(c.doubles(part) for part in (q, y, lam, unwrapped))
-        return c.State(*(part.ctypes.data for part in arrays)), arrays
+    @functools.cached_property
+    def _bounds(self) -> tuple[int, int, int]:
+        """Where displacements, multipliers and angles begin in the numbers of a state."""
+        own = self._handed.structure
+        begin = own.components * own.rotations
+        return begin, begin + own.displacements, begin + own.displacements + own.rows
+
+    def _handed_over(self, numbers: Array) -> c.State:
+        """The numbers (states,) of a state as the core takes them."""
+        begin, bounds = numbers.ctypes.data, self._bounds
+        return c.State(begin, *(begin + 8 * bound for bound in bounds))
+
+    def _parted(self, numbers: Array) -> StateParts:
+        a, b, e = self._bounds
+        return numbers[:a].reshape(-1, self._handed.structure.components), numbers[a:b], numbers[b:e], numbers[e:]
 
     @staticmethod
-    def _changed(state: tuple[Array, Array, Array, Array]) -> tuple[c.State, tuple[Array, Array, Array, Array]]:
-        """A copy of a state that the core changes."""
-        q, y, lam, unwrapped = (np.array(part, dtype=float) for part in state)
-        return c.State(*(part.ctypes.data for part in (q, y, lam, unwrapped))), (q, y, lam, unwrapped)
+    def _numbers(state: StateParts) -> Array:
+        """A copy of a state as its numbers, one after the other."""
+        q, y, lam, unwrapped = state
+        return np.concatenate([q.ravel(), y, lam, unwrapped], dtype=float)
 
-    def evaluate(self, state: tuple[Array, Array, Array, Array], given: Array) -> Parts:
-        """Results of all terms at a state (q, y, lam, unwrapped); they are overwritten by the next call."""
-        handed, arrays = self._state(*state)
+    def evaluate(self, state: StateParts, given: Array) -> Parts:
+        """Results of all terms at a state; they are overwritten by the next call."""
+        handed = self._handed_over(numbers := self._numbers(state))
         self.library.sf_evaluate(self.address, ctypes.addressof(handed), given.ctypes.data, self._scratch.address)
-        del arrays
+        del numbers
         return self.parts
 
     @property
@@ -539,32 +549,30 @@ class CoreModel:
             found.append([rows[:, a:b] for a, b in zip(tape.parts[:-1], tape.parts[1:], strict=True)])
         return found
 
-    def at(self, state: tuple[Array, Array, Array, Array], given: Array) -> CorePoint:
-        """The equations at a state (q, y, lam, unwrapped)."""
-        point = CorePoint(self)
-        handed, arrays = self._state(*state)
+    def at(self, state: StateParts, given: Array) -> CorePoint:
+        """The equations at a state."""
+        point, handed = CorePoint(self), self._handed_over(numbers := self._numbers(state))
         self.library.sf_at(self.address, ctypes.addressof(handed), given.ctypes.data, point.address)
-        del arrays
+        del numbers
         return point
 
-    def moved(self, state: tuple[Array, Array, Array, Array], step: Array) -> tuple[Array, Array, Array, Array]:
-        """The state (q, y, lam, unwrapped) after an increment (total,)."""
-        handed, arrays = self._state(*state)
-        q, y, lam, unwrapped = there = tuple(np.empty(part.shape) for part in arrays)
-        target = c.State(*(part.ctypes.data for part in there))
-        step = c.doubles(step)
+    def moved(self, state: StateParts, step: Array) -> StateParts:
+        """The state after an increment (total,)."""
+        numbers = self._numbers(state)
+        there, step = np.empty_like(numbers), c.doubles(step)
+        handed, target = self._handed_over(numbers), self._handed_over(there)
         self.library.sf_move(self.address, ctypes.addressof(handed), step.ctypes.data, 1.0, ctypes.addressof(target))
-        return q, y, lam, unwrapped
+        return self._parted(there)
 
-    def slope(self, state: tuple[Array, Array, Array, Array], rate: Array) -> Array:
-        """Derivative of the residual (total,) along a rate of what is given, at a state (q, y, lam, unwrapped)."""
+    def slope(self, state: StateParts, rate: Array) -> Array:
+        """Derivative of the residual (total,) along a rate of what is given, at a state."""
         point, slope = self._scratch, np.empty(self.total)
-        handed, arrays = self._state(*state)
+        handed = self._handed_over(numbers := self._numbers(state))
         rest = (rate.ctypes.data, point.address, slope.ctypes.data, self._sloping.ctypes.data)
         # Of the point the derivatives of chords are read: they are those of the state.
         self.library.sf_evaluate(self.address, ctypes.addressof(handed), self._still.ctypes.data, point.address)
         self.library.sf_slope(self.address, ctypes.addressof(handed), *rest)
-        del arrays
+        del numbers
         return slope
 
     @functools.cached_property
@@ -579,13 +587,13 @@ class CoreModel:
     def correct(
         self,
         system: CoreSystem,
-        state: tuple[Array, Array, Array, Array],
+        state: StateParts,
         given: Array,
         tangent: Array | None,
         border: c.Border | None,
         limits: c.Limits,
-    ) -> tuple[tuple[Array, Array, Array, Array], CorePoint, c.Report]:
-        """Newton's method from a state (q, y, lam, unwrapped): the last state, the equations there, and how it ended.
+    ) -> tuple[StateParts, CorePoint, c.Report]:
+        """Newton's method from a state: the last state, the equations there, and how it ended.
 
         Parameters
         ----------
@@ -599,7 +607,8 @@ class CoreModel:
             With it the factor is unknown, too, and changed there.
         limits : Limits
         """
-        (handed, there), point, report = self._changed(state), CorePoint(self), c.Report()
+        there, point, report = self._numbers(state), CorePoint(self), c.Report()
+        handed = self._handed_over(there)
         addresses = (system.address, given.ctypes.data, None if tangent is None else tangent.ctypes.data)
         of_structures = (
             None if border is None else ctypes.addressof(border),
@@ -608,18 +617,18 @@ class CoreModel:
         memory = (self._correcting.ctypes.data, ctypes.addressof(report))
         while self.library.sf_correct(self.address, *addresses, *of_structures, *memory) == NO_ROOM:
             system.make_room()
-        return there, point, report
+        return self._parted(there), point, report
 
     def follow(
         self,
         system: CoreSystem,
-        state: tuple[Array, Array, Array, Array],
+        state: StateParts,
         tangent: Array,
         way: c.Way,
         limits: c.Limits,
         counting: c.Counting | None,
-    ) -> tuple[tuple[Array, Array, Array, Array], bool]:
-        """Follow growing loads from a state (q, y, lam, unwrapped): the last equilibrium, and whether the way ends.
+    ) -> tuple[StateParts, bool]:
+        """Follow growing loads from a state: the last equilibrium, and whether the way ends.
 
         Parameters
         ----------
@@ -641,11 +650,11 @@ class CoreModel:
         addresses = (ctypes.addressof(way), ctypes.addressof(limits), counted, tangent.ctypes.data)
         rest = (point.address, self._following.ctypes.data, ctypes.addressof(report))
         while True:
-            handed, there = self._changed(state)
+            handed = self._handed_over(there := self._numbers(state))
             addressed = (*addresses, ctypes.addressof(handed), *rest)
             ended = self.library.sf_follow(self.address, system.address, *addressed)
             if ended != NO_ROOM:
-                return there, not ended
+                return self._parted(there), not ended
             # From the beginning: the matrix of the last step is not known any more.
             system.make_room()
             ctypes.pointer(way)[0] = begun

@@ -462,16 +462,19 @@ class Curve:
         told = (Told * room)()
         states[0], tangents[0] = now_state, np.append(now.tangent.z, now.tangent.factor)
         told[0] = Told(factor=now.factor, arc=now.arc, negative=now.inertia.negative)
-        last = None if before is None else np.append(before.tangent.z, before.tangent.factor)
         columns, usual = equations.jacobian_columns, usual_square(equations)
         own = Limits(iterations=ITERATIONS, short=SHORT, turned=TURN, near=tolerances.BALANCED, returns=False)
         limits, alive = limits_for_core(equations, own, self.prepared.weight)
         addresses = (part.ctypes.data for part in (*given, self.weight, self._probe, *columns))
-        for name, address in zip(("begun", "rate", "metric", "probe", "column", "line", "entry"), addresses, strict=True):
+        for name, address in zip(
+            ("begun", "rate", "metric", "probe", "column", "line", "entry"), addresses, strict=True
+        ):
             setattr(rules, name, address)
         rules.unit, rules.passing, rules.doubt, rules.roughly, rules.usual = self.unit, PASSING, DOUBT, ROUGHLY, usual
         rules.apart, rules.room, rules.points = self._apart, room, 1
-        rules.before, rules.arc_before = (None, 0.0) if last is None else (last.ctypes.data, before.arc)
+        if before is not None:
+            last = np.append(before.tangent.z, before.tangent.factor)
+            rules.before, rules.arc_before = last.ctypes.data, before.arc
         rules.state, rules.tangent, rules.told = states.ctypes.data, tangents.ctypes.data, ctypes.addressof(told)
         rules.first, rules.first_factor = start.ctypes.data, first.factor
         equations.traced(rules, limits, counting[0])
@@ -590,7 +593,9 @@ class _Across:
             return None
         weight = self.primal_factor * self.curve.prepared.weight
         passing = 0.0 if self.sharp else PASSING
-        return ForCore(weight, border=(*given, self.row, self.across.factor / self.curve.unit**2, self.curve._apart, passing))
+        return ForCore(
+            weight, border=(*given, self.row, self.across.factor / self.curve.unit**2, self.curve._apart, passing)
+        )
 
     def suffices(self, here: Balance) -> bool:
         """Whether an intermediate point is accurate enough; its gaps must be closed too, as small ones move much."""
