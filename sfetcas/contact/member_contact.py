@@ -640,8 +640,8 @@ class MemberContact:
         Where it is known where lines end these places go on sliding; where that leads nowhere, or is not known, forces
         at ends of elements show where they end, and these slide from there.  Members touch each other at places that
         slide; where these lead nowhere, and the members are as near between them, along a line.  Rough ones then touch
-        at places that stay on the first member.  ``steady`` says that the source is the same equilibrium on another mesh,
-        where usually all points push that did.
+        at places that stay on the first member.  ``steady`` says that the source is the same equilibrium on another
+        mesh: there all points push that did, but for a few cases.
         """
         lines = self.lines.keys
         # Those that stood in the step before go on so.

@@ -280,7 +280,7 @@ class _Sparse:
 
     @functools.cached_property
     def product(self) -> Product:
-        return Product(pattern(self._n, self._row, self._column))
+        return Product(self._n, self._row, self._column)
 
     @functools.cached_property
     def without_pivots(self) -> _Factors:
@@ -301,22 +301,22 @@ def _unsaid() -> contextlib.redirect_stderr[io.StringIO]:
 
 
 class Product:
-    """Products of sparse matrices of one pattern with blocks of vectors."""
+    """Products of (n, n) matrices of one pattern with blocks of vectors.
 
-    def __init__(self, sparsity: ca.Sparsity) -> None:
-        self._sparsity = sparsity
+    Parameters
+    ----------
+    n : int
+    row, column : ndarray
+        Positions of the entries.
+    """
+
+    def __init__(self, n: int, row: Array, column: Array) -> None:
+        self._n, self._row, self._column = n, row, column
 
     def __call__(self, entries: Array, x: Array) -> Array:
-        """The matrix with these entries, column by column, times x (n, k)."""
-        batch = self._batch(x.shape[1])
-        batch.set(0, entries)
-        batch.set(1, x.T)
-        return batch()[0].reshape(x.T.shape).T.copy()
-
-    @kept(4)
-    def _batch(self, columns: int) -> Batch:
-        entries, x = ca.MX.sym("entries", self._sparsity.nnz()), ca.MX.sym("x", self._sparsity.size1(), columns)
-        return Batch(ca.Function("product", [entries, x], [ca.mtimes(ca.MX(self._sparsity, entries), x)]), 1)
+        """The matrix with these entries times x (n, k)."""
+        found = [np.bincount(self._row, weights=entries * part[self._column], minlength=self._n) for part in x.T.copy()]
+        return np.array(found).T.copy()
 
 
 class _Factors:
@@ -599,15 +599,18 @@ NO_ROOM = 2
 
 def _sparse_order(n: int, row: Array, column: Array, last: int = 0) -> Index:
     """The unknowns (n,) in an order that keeps factors sparse; the ``last`` ones, which may be no pivots, last."""
-    if len(row) > FEW_ENTRIES:
-        return _found_order(n, row, column, last)
-    return _kept_order(n, np.asarray(row, np.int64).tobytes(), np.asarray(column, np.int64).tobytes(), last)
+    kept = _kept_order if len(row) <= FEW_ENTRIES else _kept_large_order
+    return kept(n, np.asarray(row, np.intc).tobytes(), np.asarray(column, np.intc).tobytes(), last)
 
 
-@functools.lru_cache(maxsize=128)
-def _kept_order(n: int, row: bytes, column: bytes, last: int) -> Index:
-    """The order of a small pattern: one comes many times."""
-    return _found_order(n, np.frombuffer(row, np.int64), np.frombuffer(column, np.int64), last)
+def _order(n: int, row: bytes, column: bytes, last: int) -> Index:
+    return _found_order(n, np.frombuffer(row, np.intc), np.frombuffer(column, np.intc), last)
+
+
+_kept_order, _kept_large_order = functools.lru_cache(maxsize=128)(_order), functools.lru_cache(maxsize=4)(_order)
+"""Orders of small patterns, which come many times, and of the last large ones, of which factors of several kinds are
+made.
+"""
 
 
 def _found_order(n: int, row: Array, column: Array, last: int) -> Index:

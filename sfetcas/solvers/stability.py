@@ -23,14 +23,13 @@ import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-import casadi as ca
 import numpy as np
 
 from .. import tolerances
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.core import Counting
-from ..mathematics.linear import BLURRED, MISSES, InertiaSolver, Product, SparseSolver, blurred, pattern
+from ..mathematics.linear import BLURRED, MISSES, InertiaSolver, Product, SparseSolver, blurred
 from ..mechanics.equations import Equations, Point
 from .redundancy import independent
 from .sides import Sides, alike
@@ -495,17 +494,13 @@ class StabilityTest:
         return InertiaSolver(self.equations.total, self.equations.row, self.equations.column)
 
     @functools.cached_property
-    def _pattern(self) -> ca.Sparsity:
-        return pattern(self._n, self._h_row, self._h_column)
-
-    @functools.cached_property
     def _ldl(self) -> InertiaSolver:
         return InertiaSolver(self._n, self._h_row, self._h_column)
 
     @functools.cached_property
     def _times(self) -> Product:
         """The product of the weighted matrix with a block of vectors (n, k)."""
-        return Product(self._pattern)
+        return Product(self._n, self._h_row, self._h_column)
 
     def _subspace(self, point: Point, entries: Array, shift: float) -> tuple[Array, Array]:
         """Smallest eigenvalues (k,) above the shift and their vectors (n, k), by inverse iteration of a subspace.
