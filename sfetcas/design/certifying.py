@@ -10,7 +10,7 @@ import numpy as np
 from .. import tolerances
 from ..description.scene import Scene
 from ..equilibria.settings import Settings
-from ..equilibria.single import finished, unjudged
+from ..equilibria.single import finished
 from ..equilibria.solution import Equilibrium
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
@@ -79,7 +79,7 @@ def prepared_case(scene: Scene, equations: CaseEquations, mesh: Mesh) -> Prepare
 def _error(scene: Scene, equations: CaseEquations, here: Solved, accuracy: float) -> tuple[float, tuple[str, ...]]:
     if here.model.mesh.lies:
         found = kept_of(scene, Settings(accuracy=accuracy), here).halved()
-        return (np.inf, (COARSE,)) if found is None else (sum(halving(here.fields, unjudged(found).fields)), ())
+        return (np.inf, (COARSE,)) if found is None else (sum(halving(here.fields, found.fields)), ())
     mesh = here.model.mesh.refined()
     if mesh.same(here.model.mesh):
         return 0.0, ()
@@ -88,5 +88,5 @@ def _error(scene: Scene, equations: CaseEquations, here: Solved, accuracy: float
     found = fine.correct(state, fine.model.loading(here.factor), iterations=25, most=1.5)
     if not found.converged:
         return np.inf, (COARSE,)
-    difference, left = halving(here.fields, unjudged(found).fields)
+    difference, left = halving(here.fields, found.fields)
     return difference + left, ()

@@ -31,7 +31,7 @@ from ..solvers.redundancy import loose_rows, redundant
 from .force_balance import refuse_lost_forces
 from .meshing import Meshing
 from .refinement import LEVELS, MOST_ELEMENTS, Refinement
-from .single import finished, unjudged
+from .single import finished
 from .solution import Equilibrium, refuse_large
 from .ways import NO_ENERGY, Ways
 
@@ -274,7 +274,7 @@ class MemberContactSteps:
                 some = {n: long & felt[now.model.elements_of(n)] for n, long in marks.items() if n in now.model.members}
                 marks = some if any(marked.any() for marked in some.values()) else marks
             finer = self._onto(now.model.mesh.refined(marks, now.fields.kinks), now, factor)
-            difference, error = self.meshes.judged(unjudged(now), unjudged(finer))
+            difference, error = self.meshes.judged(now, finer)
             if self.meshes.prescribed:
                 error += difference
                 break

@@ -18,7 +18,7 @@ from ..solvers.prepared import Prepared, Solved
 from ..solvers.stability import Stability
 from .quantities import WHERE, Quantity
 from .settings import Settings
-from .solution import Equilibrium
+from .single import unjudged
 
 __all__ = ["PILOT_ELEMENTS", "EquilibriumResult", "Meshing"]
 
@@ -139,8 +139,10 @@ class Meshing:
         flexible = {n: m for n, m in scene.members.items() if m.type == "flexible"}
         counts = {n: settings.elements or m.elements for n, m in flexible.items()}
         self.fixed = {n for n, count in counts.items() if count is not None}
-        equal = uniform_mesh(scene, order, {n: count or 1 for n, count in counts.items()})
-        cuts = {n: (equal if n in self.fixed else mesh).cuts[n] for n in mesh.cuts}
+        cuts = mesh.cuts
+        if self.fixed:
+            equal = uniform_mesh(scene, order, {n: count or 1 for n, count in counts.items()})
+            cuts = {n: (equal if n in self.fixed else mesh).cuts[n] for n in mesh.cuts}
         # Before the first step nothing is remembered.
         memory: dict[str, Remembered] | None = {} if scene.remembers else None
         self.target = Mesh(order, cuts, settings.gauss, mesh.rigid, stops=self.stops, memory=memory)
@@ -164,7 +166,7 @@ class Meshing:
         """Name of the quantity that the accuracy refers to; empty for the positions."""
         return "" if self.quantity is None else self.quantity.text
 
-    def judged(self, coarse: Equilibrium, fine: Equilibrium) -> tuple[float, float]:
+    def judged(self, coarse: Solved, fine: Solved) -> tuple[float, float]:
         """Relative difference of two answers in the quantity of the accuracy, and estimated error of the finer one.
 
         Raises
@@ -175,7 +177,7 @@ class Meshing:
         if self.quantity is None:
             return halving(coarse.fields, fine.fields)
         try:
-            difference = self.quantity.difference(coarse, fine)
+            difference = self.quantity.difference(unjudged(coarse), unjudged(fine))
         except SceneError as error:
             raise SceneError(str(error), WHERE) from None
         return difference, remaining(difference, gained(coarse.fields, fine.fields, positions=self.quantity.positions))

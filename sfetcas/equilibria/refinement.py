@@ -27,7 +27,7 @@ from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
 from ..solvers.stability import LIGHT
 from .meshing import EquilibriumResult, Meshing
 from .mirrors import has_twin
-from .single import finished, unjudged
+from .single import finished
 from .solution import Equilibrium, refuse_large
 from .ways import KEPT
 
@@ -312,7 +312,7 @@ class Refinement:
 
     def _difference(self, coarse: EquilibriumResult, fine: EquilibriumResult) -> tuple[float, float]:
         """How far two answers are apart in what the accuracy is of, and the estimated error of the finer one."""
-        return self.meshes.judged(unjudged(coarse.solved), unjudged(fine.solved))
+        return self.meshes.judged(coarse.solved, fine.solved)
 
     def answer(self, found: EquilibriumResult, error: float, halved: float | None) -> Equilibrium:
         """The answer of a step that others remember, with its estimated error and how far it is from a coarser one."""

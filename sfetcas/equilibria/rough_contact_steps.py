@@ -27,7 +27,7 @@ from .force_balance import refuse_lost_forces
 from .member_contact_steps import on_way, undeformed
 from .meshing import Meshing
 from .refinement import MOST_ELEMENTS
-from .single import finished, unjudged
+from .single import finished
 from .solution import Equilibrium, refuse_large
 
 __all__ = ["RoughContactSteps", "lost_while"]
@@ -145,7 +145,7 @@ class RoughContactSteps:
         """Estimated errors of states: of first order where what slides is decided, so that what is left is not less
         than what the halving changed; and how deep members are in what they touch.
         """
-        judged = (self.meshes.judged(unjudged(a), unjudged(b)) for a, b in zip(coarse, fine, strict=True))
+        judged = (self.meshes.judged(a, b) for a, b in zip(coarse, fine, strict=True))
         deep = (run.penetration(one.fields) / self.scene.size for one in fine)
         return [max(*pair, depth) for pair, depth in zip(judged, deep, strict=True)]
 

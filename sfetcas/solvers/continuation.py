@@ -14,6 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from .. import tolerances
 from ..errors import SolveError
 from ..mathematics.core import Way
 from ..mechanics.equations import State
@@ -21,6 +22,8 @@ from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from .newton import Limits
 from .prepared import Prepared, Solved
+from .redundancy import redundant, with_sharing
+from .residuals import relative_residual
 
 __all__ = [
     "CONTRACTION",
@@ -96,17 +99,22 @@ class Followed:
 
     Attributes
     ----------
-    state : State
-        State at the end of the way, or where it was lost.
+    found : Solved
+        What was found at the end of the way, or where it was lost.
     reached : bool
         Whether the end of the way was reached.
     left : tuple of float
         Parts of the way at which an unstable equilibrium was left.
     """
 
-    state: State
+    found: Solved
     reached: bool
     left: tuple[float, ...]
+
+    @property
+    def state(self) -> State:
+        """State at the end of the way, or where it was lost."""
+        return self.found.state
 
 
 def between(model: Model, begin: float, end: float) -> Callable[[float], Loading]:
@@ -191,10 +199,19 @@ def follow(
     tries = MOST + int(AROUND * driven) if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL
     proportional = not prepared.model.scene.histories if proportional is None else proportional
     following = _Following(prepared, way, longest, switch_branch, allowed, refuse, contraction, proportional)
-    begin = _On(prepared.correct(state, way(0.0)), 0.0)
+    begin = _On(_begun(prepared, state, way(0.0)), 0.0)
     plainly = following.plainly(begin, whole, tries)
     here, reached = advanced(*plainly[:2], following.trial, lambda here: here.done >= 1.0, tries=plainly[2])
-    return Followed(here.found.state, reached, tuple(following.left))
+    return Followed(here.found, reached, tuple(following.left))
+
+
+def _begun(prepared: Prepared, state: State, loading: Loading) -> Solved:
+    """An equilibrium from which loads are followed, corrected where it is none to rounding already."""
+    begin, equations = Solved.taken(prepared, state, loading), prepared.equations
+    if equations.rows and redundant(equations, begin.point):
+        return prepared.correct(state, loading)
+    exact = relative_residual(equations, begin.point) <= tolerances.EXACT
+    return begin if exact else prepared.correct(state, loading)
 
 
 def plain_way(contraction: float = CONTRACTION) -> tuple[Way, Limits]:
@@ -262,7 +279,17 @@ class _Following:
             return usual
         if way.done == 0.0:
             return begin, way.step, way.tries
-        return _On(Solved.taken(prepared, found[0], self.way(way.done)), way.done), way.step, way.tries
+        there, loading, ended = found[0], self.way(way.done), found[1]
+        if ended is None:
+            return _On(Solved.taken(prepared, there, loading), way.done), way.step, way.tries
+        point, report = ended
+        there, point = with_sharing(prepared.equations, there, loading, point, report.tolerance)
+        residual = relative_residual(prepared.equations, point)
+        return (
+            _On(Solved(prepared, there, loading, point, residual, iterations=report.iterations), 1.0),
+            way.step,
+            way.tries,
+        )
 
     def trial(self, here: _On, step: float) -> tuple[_On | None, float]:
         """The next point, None if the step is refused, and the length of the next step, parts of the way."""
