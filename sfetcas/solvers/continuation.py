@@ -285,11 +285,8 @@ class _Following:
         point, report = ended
         there, point = with_sharing(prepared.equations, there, loading, point, report.tolerance)
         residual = relative_residual(prepared.equations, point)
-        return (
-            _On(Solved(prepared, there, loading, point, residual, iterations=report.iterations), 1.0),
-            way.step,
-            way.tries,
-        )
+        solved = Solved(prepared, there, loading, point, residual, iterations=report.iterations)
+        return _On(solved, 1.0), way.step, way.tries
 
     def trial(self, here: _On, step: float) -> tuple[_On | None, float]:
         """The next point, None if the step is refused, and the length of the next step, parts of the way."""
