@@ -167,7 +167,7 @@ def test_signs_of_eigenvalues_where_rows_depend_on_each_other():
             loading = equations.model.loading(factor)
             point = prepared.correct(equations.start(loading), loading).point
             equations.redundant = None
-            found = test._clearly_negative(point)
+            found = test._clearly_negative(point.entries)
             known = test._all(point, test._weighted(point), test._limit(test._weighted(point)))
             if found is not None:
                 told += 1

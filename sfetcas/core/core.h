@@ -345,6 +345,8 @@ typedef struct {
   sf_told_of *told;                  /* (room,) */
 } sf_curve;
 
+SF_PUBLIC int sf_independent(const sf_model *model, const int *column, const int *line, const int *entry,
+                             const double *entries, double roughly, double usual, double *products);
 SF_PUBLIC int sf_trace_size(const sf_model *model);
 SF_PUBLIC int sf_trace(const sf_model *model, sf_system *system, sf_curve *curve, const sf_limits *limits,
                        const sf_count_of *count, sf_point *point, double *memory, sf_report *report);

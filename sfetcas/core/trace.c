@@ -32,7 +32,7 @@ static int sf_make_along(const sf_model *m, double *memory, sf_along *along) {
   PART(both, 2 * m->total);
   PART(results, m->results);
   PART(solving, 4 * m->total);
-  PART(products, m->rows * m->rows);
+  PART(products, m->rows * (m->rows + 1));
 #undef PART
   if (memory) {
     sf_lay_out(m, memory + n, &along->expected);
@@ -74,16 +74,21 @@ static double sf_apart(const sf_model *m, const double *a, const double *b) {
   return most;
 }
 
-/* Whether rows clearly do not depend on each other, see redundancy.py: by bounds of the least and largest square. */
-static int sf_independent(const sf_model *m, const sf_curve *curve, const double *entries, sf_along *along) {
-  double *g = along->products, *x = along->right, trace = 0.0, inverse = 0.0;
+/* Whether rows clearly do not depend on each other, see redundancy.py: by bounds of the least and largest square.
+ *
+ * Of the rows by the unknowns it is given where columns begin, rows, and entries of the matrix.  products has room for
+ * rows (rows + 1) numbers.
+ */
+int sf_independent(const sf_model *m, const int *column, const int *line, const int *entry, const double *entries,
+                   double roughly, double usual, double *products) {
+  double *g = products, *x = products + m->rows * m->rows, trace = 0.0, inverse = 0.0;
   int n = m->rows, i, j, k;
   for (i = 0; i < n * n; ++i) g[i] = 0.0;
   for (k = 0; k < m->unknowns; ++k)
-    for (i = curve->column[k]; i < curve->column[k + 1]; ++i)
-      for (j = curve->column[k]; j <= i; ++j) {
-        int a = curve->line[i], b = curve->line[j];
-        g[a > b ? a * n + b : b * n + a] += entries[curve->entry[i]] * entries[curve->entry[j]];
+    for (i = column[k]; i < column[k + 1]; ++i)
+      for (j = column[k]; j <= i; ++j) {
+        int a = line[i], b = line[j];
+        g[a > b ? a * n + b : b * n + a] += entries[entry[i]] * entries[entry[j]];
       }
   for (i = 0; i < n; ++i) trace += g[i * n + i];
   /* With the Cholesky factor L the trace of the inverse is the sum of the squares of the inverse of L. */
@@ -101,7 +106,7 @@ static int sf_independent(const sf_model *m, const sf_curve *curve, const double
       x[i] = sum / g[i * n + i];
       inverse += x[i] * x[i];
     }
-  return curve->roughly * (trace > curve->usual ? trace : curve->usual) * inverse < 1.0;
+  return roughly * (trace > usual ? trace : usual) * inverse < 1.0;
 }
 
 /* The tangent of the curve at an equilibrium, with the factor last, signed as the one before; 1 where there is none.
@@ -189,7 +194,9 @@ int sf_trace(const sf_model *m, sf_system *system, sf_curve *curve, const sf_lim
     if (i == 2) return 2;
     same = !i && report->good;
     if (same) {
-      if (m->rows && !sf_independent(m, curve, point->entries, &along)) return 1;
+      if (m->rows && !sf_independent(m, curve->column, curve->line, curve->entry, point->entries, curve->roughly,
+                                     curve->usual, along.products))
+        return 1;
       i = sf_tangent(m, system, curve, &border, limits, &along.there, point, tangent, beyond, &next->doubtful, &along);
       if (i) return i;
       cosine = sf_inner(m, curve, tangent, beyond);

@@ -478,6 +478,7 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL | None:
     library.sf_follow_size.argtypes = [_pointer]
     library.sf_negative.argtypes = [_pointer] * 5
     library.sf_follow.argtypes = [_pointer] * 10
+    library.sf_independent.argtypes = [*[_pointer] * 5, _double, _double, _pointer]
     library.sf_trace_size.argtypes = [_pointer]
     library.sf_trace.argtypes = [_pointer] * 8
     library.sf_solve_cases.argtypes = [_pointer] * 9

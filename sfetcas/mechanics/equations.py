@@ -14,6 +14,7 @@ import copy
 import functools
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from .rotations import RotationFreedom
 from .terms import Group, pulls_of, rotation_gradient
 
 __all__ = [
+    "MOST_ROWS",
     "Equations",
     "Point",
     "State",
@@ -47,6 +49,9 @@ __all__ = [
 
 MOST_CLOSED = 4_000_000
 """Entries of a matrix of closings up to which displacements are chosen by them."""
+
+MOST_ROWS = 100
+"""Up to so many rows the core finds whether they depend on each other, which takes the third power of their number."""
 
 
 @dataclass(frozen=True)
@@ -140,6 +145,8 @@ class Equations:
             for number in range(len(model.terms))
         ]
         self._given: list[tuple[Loading, Array]] = []
+        # Limits of corrections as the core takes them, and what these point to.
+        self.limits: dict[Any, tuple[Limits, tuple[Array, ...]]] = {}
         self.noise = np.zeros(self.total)
         self._core = core_model(layout, model, self.noise) if kernels in ("auto", "core") else None
         self._judge()
@@ -168,7 +175,8 @@ class Equations:
     def _with(self, model: Model, changed: Collection[int]) -> Equations:
         """The same equations of a model that differs by the data of groups of terms."""
         found = copy.copy(self)
-        found.__dict__.pop("_convex", None)
+        for made in ("_convex", "undeformed_entries"):
+            found.__dict__.pop(made, None)
         found.model, found.tables, found._given = model, self.layout.tables_of(model), []
         found._core = None if self._core is None else self._core.of(model)
         found._terms = [
@@ -669,10 +677,16 @@ class Equations:
 
     def _elastic_diagonal(self) -> Array:
         """The diagonal of :meth:`elastic_entries`, to which constraints add nothing."""
-        if self._core is None:
-            return self.elastic_entries()[self.diagonal]
+        entries = self.elastic_entries() if self._core is None else self.undeformed_entries
+        return entries[self.diagonal]
+
+    @functools.cached_property
+    def undeformed_entries(self) -> Array:
+        """Entries of the Newton matrix in the undeformed state without loads."""
         rest, nothing = self._at_rest()
-        return self._core.at(_arrays(rest), self.given(nothing)).entries[self.diagonal]
+        if self._core is not None:
+            return self._core.at(_arrays(rest), self.given(nothing)).entries
+        return self.at(rest, nothing).entries
 
     def elastic_entries(self) -> Array:
         """Entries of the Newton matrix for the strain energy of the elements alone in the undeformed state."""
@@ -766,6 +780,12 @@ class Equations:
         order = np.argsort(column, kind="stable")
         begins = np.searchsorted(column[order], np.arange(self.unknowns + 1))
         return integers(begins), integers(row[order]), integers(chosen[order])
+
+    def clearly_independent(self, entries: Array, roughly: float, usual: float) -> bool:
+        """Whether the core tells of a matrix that rows do not depend on each other; it is asked where these are few."""
+        if self._core is None or self.rows > MOST_ROWS:
+            return False
+        return self._core.independent(self.jacobian_columns, doubles(entries), roughly, usual)
 
     def of_rows(self, entries: Array) -> Array:
         """Entries of the Newton matrix that belong to the Jacobian of the constraints; zero in place of all others."""

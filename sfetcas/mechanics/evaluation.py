@@ -660,6 +660,21 @@ class CoreModel:
             system.make_room()
             ctypes.pointer(way)[0] = begun
 
+    def independent(self, columns: Sequence[Array], entries: Array, roughly: float, usual: float) -> bool:
+        """Whether rows clearly do not depend on each other, see ``sf_independent``.
+
+        ``columns`` are as of :attr:`.Equations.jacobian_columns`.
+        """
+        addresses = (part.ctypes.data for part in (*columns, entries))
+        rest = (roughly, usual, self._products.ctypes.data)
+        return bool(self.library.sf_independent(self.address, *addresses, *rest))
+
+    @functools.cached_property
+    def _products(self) -> Array:
+        """Memory that finding out about rows takes."""
+        rows = self._handed.structure.rows
+        return np.zeros(rows * (rows + 1))
+
     def trace(self, system: CoreSystem, curve: c.Curve, limits: c.Limits, counting: c.Counting) -> bool:
         """Plain steps along a curve, which are written to it, see ``sf_trace``: whether its room is filled.
 

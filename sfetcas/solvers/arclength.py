@@ -22,7 +22,7 @@ from ..errors import SolveError
 from ..mathematics.arrays import TINY, Array, Index
 from ..mathematics.core import Curve as CoreCurve
 from ..mathematics.core import Told
-from ..mechanics.equations import Point, State
+from ..mechanics.equations import MOST_ROWS, Point, State
 from ..mechanics.loading import Loading
 from ..mechanics.memory import Remembering
 from .between_states import turned_between
@@ -63,9 +63,6 @@ STARTS, BEHIND = 60, 10.0
 
 PLACES = (1.0 / 3.0, 2.0 / 3.0)
 """Places within a step at which it is looked for turning points of what members remember."""
-
-MOST_ROWS = 100
-"""Up to so many rows the core finds whether they depend on each other, which takes the third power of their number."""
 
 AT_ONCE = 32
 """Points that the core finds in one call, at most."""

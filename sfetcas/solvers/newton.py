@@ -413,6 +413,9 @@ def _by_core(system: System, state: State, factor: float, limits: Limits) -> Con
 
 def limits_for_core(equations: Equations, limits: Limits, weight: Array) -> tuple[CoreLimits, tuple[Array, ...]]:
     """Limits as the core takes them, with the weight of the proximal term, and arrays that have to live as long."""
+    known = equations.limits.get(limits)
+    if known is not None and known[1][1] is weight:
+        return known
     slides, weight = integers(equations.slid_places), doubles(weight)
     found = CoreLimits(
         iterations=limits.iterations,
@@ -435,7 +438,8 @@ def limits_for_core(equations: Equations, limits: Limits, weight: Array) -> tupl
         dual=tolerances.DUAL,
         weight=weight.ctypes.data,
     )
-    return found, (slides, weight)
+    equations.limits[limits] = found, (slides, weight)
+    return equations.limits[limits]
 
 
 def _first_two(lengths: list[float], good: bool) -> tuple[float, float]:

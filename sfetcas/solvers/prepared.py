@@ -115,11 +115,10 @@ class Prepared:
 
         See :func:`~sfetcas.solvers.constraints.free_motions`.
         """
-        equations, nothing = self.equations, self.model.loading(0.0, 0.0)
-        undeformed = equations.start(nothing)
-        if self._test.is_held(lambda: equations.at(undeformed, nothing)):
+        equations = self.equations
+        if self._test.is_held:
             return np.zeros((equations.unknowns, 0))
-        return free_motions(equations, self._test.weight, undeformed)
+        return free_motions(equations, self._test.weight, equations.start(self.model.loading(0.0, 0.0)))
 
     @functools.cached_property
     def lacks_slack(self) -> bool:

@@ -53,6 +53,8 @@ def loose_rows(equations: Equations, point: Point, slack: float | None = None) -
 
 def _loose_rows(equations: Equations, point: Point, slack: float) -> Array:
     usual = usual_square(equations)
+    if equations.clearly_independent(point.entries, ROUGHLY, usual):
+        return np.zeros((equations.rows, 0))
     if equations.rows > MANY:
         squares, left, largest = _smallest(equations, point, APART * slack**2, usual)
     else:

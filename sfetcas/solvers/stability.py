@@ -20,7 +20,6 @@ the mesh; its symmetric part is taken, whose eigenvalues are those of the energy
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -200,7 +199,7 @@ class StabilityTest:
     def negative(self, point: Point) -> int:
         """Number of negative eigenvalues alone, at a fraction of the cost of :meth:`test`."""
         point = self.equations.symmetric(point)
-        clear = self._clearly_negative(point)
+        clear = self._clearly_negative(point.entries)
         if clear is not None:
             return clear
         entries = self._weighted(point)
@@ -302,7 +301,7 @@ class StabilityTest:
     def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
         """Numbers of negative and of zero eigenvalues alone; in large models the latter only if ``doubtful``."""
         point = self.equations.symmetric(point)
-        clear = self._clearly_negative(point)
+        clear = self._clearly_negative(point.entries)
         if clear is not None:
             return Inertia(clear, 0)
         entries = self._weighted(point)
@@ -448,21 +447,23 @@ class StabilityTest:
         values = np.linalg.eigvalsh(self._projected(self._weighted(point), self._rows(point))[0])
         return int((values[self._apart :] < shift).sum())
 
-    def _clearly_negative(self, point: Point) -> int | None:
+    def _clearly_negative(self, entries: Array) -> int | None:
         """Number of negative eigenvalues where the core tells it and none is near zero; see :meth:`counting`."""
         if self._n == 0:
             return 0
         if self.equations.rows and self.equations.redundant:
             return None
-        return None if self.counting is None else self.equations.clearly_negative(point.entries, self.counting[0])
+        return None if self.counting is None else self.equations.clearly_negative(entries, self.counting[0])
 
-    def is_held(self, undeformed: Callable[[], Point]) -> bool:
-        """Whether clearly nothing can move without strain, by the core; False where it does not tell.
+    @property
+    def is_held(self) -> bool:
+        """Whether clearly nothing of the undeformed structure can move without strain; False where the core does not
+        tell.
 
         Nor where displacements have no stiffness of their own: whether closings determine them it does not know.
         """
         known = self._n == self.equations.unknowns and self.counting is not None
-        return known and self._clearly_negative(undeformed()) == 0
+        return known and self._clearly_negative(self.equations.undeformed_entries) == 0
 
     @functools.cached_property
     def counting(self) -> tuple[Counting, Array] | None:
