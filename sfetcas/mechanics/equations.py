@@ -531,6 +531,11 @@ class Equations:
         return core.negative(system, doubles(entries), counting)
 
     @property
+    def solved_by_core(self) -> bool:
+        """Whether the core solves for steps with the matrix of these equations, too: not where it has many entries."""
+        return self._with_system is not None
+
+    @property
     def by_core(self) -> bool:
         """Whether the core evaluates these equations."""
         return self._core is not None

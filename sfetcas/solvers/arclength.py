@@ -64,9 +64,6 @@ STARTS, BEHIND = 60, 10.0
 PLACES = (1.0 / 3.0, 2.0 / 3.0)
 """Places within a step at which it is looked for turning points of what members remember."""
 
-AT_ONCE = 32
-"""Points that the core finds in one call, at most."""
-
 HISTORY = 1e-5
 """Step of the differences of loads with histories, share of the unit of the factor: of second order, so 1e-10."""
 
@@ -430,7 +427,7 @@ class Curve:
     def for_steps(self) -> bool:
         """Whether the core takes plain steps along the curve."""
         equations, prepared = self.equations, self.prepared
-        if not equations.by_core or self.for_core is None or prepared.counting is None:
+        if not equations.solved_by_core or self.for_core is None or prepared.counting is None:
             return False
         return not self.remembers and equations.rows <= MOST_ROWS and bool(equations.rotation_unknowns)
 
@@ -453,7 +450,7 @@ class Curve:
         neutral = now.tangent.neutral is not None or now.inertia.zero > 0
         if counting is None or given is None or neutral or (equations.rows and redundant(equations, now.point)):
             return []
-        room, total = 1 + min(most, AT_ONCE), equations.total
+        room, total = 1 + most, equations.total
         start, now_state = (np.concatenate([part.ravel() for part in vars(one.state).values()]) for one in (first, now))
         states, tangents = np.empty((room, len(start))), np.empty((room, total + 1))
         told = (Told * room)()

@@ -90,6 +90,12 @@ A bifurcation takes five to fifteen; more are needed only where rounding makes b
 EXPECTED = 3
 """Newton iterations of a step that is as long as it should be."""
 
+AT_ONCE = 32
+"""Points that the core finds in one call, at most."""
+
+BEFORE = 2
+"""Steps of a stretch on which something is watched before the core is asked for more."""
+
 LOOP = 8
 """Points before a curve may close: fewer make no loop."""
 
@@ -296,7 +302,8 @@ class _Piece:
 
     ``more`` is the number of steps that are still to be taken, ``budget`` the value of ``curve.searched`` at which the
     stretch is given up; ``missing``, ``missed`` and ``passed`` are as of :func:`trace` and :class:`Traced`.  ``curve``
-    is that on which the next step goes.
+    is that on which the next step goes.  ``asks`` is the number of points that the core is asked for next where they
+    are watched, ``waits`` the number of steps until it is asked, ``vain`` how often in a row it found none.
     """
 
     curve: Curve
@@ -317,9 +324,12 @@ class _Piece:
     passed: Callable[[Standing, Standing], bool] | None = None
     waits: int = 0
     vain: int = 0
+    asks: int = 1
 
     def traced(self) -> Traced:
         """The stretch from its first point on."""
+        # What is watched is often met soon.
+        self.waits = 0 if self.watch is None else BEFORE
         _, arrived = advanced(self.points[0], FIRST, self.trial, lambda _: self.ended(), shortest=SHORTEST)
         end, near = self.end if arrived else "lost", tuple(self.near)
         crossed = self.crossed if end == "margin" else ()
@@ -395,7 +405,9 @@ class _Piece:
             self.waits -= 1
             return length
         rules = core_rules(length, self.span, self.stride, len(self.points) - 1)
-        found = self.curve.plain_steps(rules, self.points[0], self.before, now, self.more)
+        watched = self.watch is not None or self.passed is not None
+        most = min(self.more, self.asks if watched else AT_ONCE)
+        found = self.curve.plain_steps(rules, self.points[0], self.before, now, most)
         full, length = rules.points == rules.room, rules.length
         for count, (a, b) in enumerate(pairwise([now, *found])):
             if self._meets(a, b):
@@ -405,6 +417,8 @@ class _Piece:
             self.before = found[-2] if len(found) > 1 else now
             self.points += found
             self.more -= len(found)
+        # What is beyond something that is met has been found in vain.
+        self.asks = min(2 * self.asks, AT_ONCE) if full else 1
         # The step at which it ended is not plain.
         self.vain = 0 if found else self.vain + 1
         self.waits = max(self.vain - 1, int(bool(found) and not full))
