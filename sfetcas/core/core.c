@@ -8,6 +8,7 @@
 #include "follow.c"
 #include "afar.c"
 #include "trace.c"
+#include "lowest.c"
 #include "motion.c"
 #include "pivots.c"
 

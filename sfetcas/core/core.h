@@ -317,6 +317,10 @@ SF_PUBLIC int sf_solve_cases(const sf_model *model, sf_system *system, sf_cases 
                              const sf_limits *limits, const sf_limits *near_limits, const sf_count_of *count,
                              sf_point *point, double *memory);
 
+SF_PUBLIC int sf_lowest_size(const sf_model *model);
+SF_PUBLIC int sf_lowest(const sf_model *model, sf_system *system, const double *entries, const double *weight,
+                        double shift, double least, double dual, double *values, double *vectors, double *memory);
+
 /* ---- curves of equilibria ------------------------------------------------------------------------------ */
 
 /* What is told of a point of a curve. */

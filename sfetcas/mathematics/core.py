@@ -478,6 +478,8 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL | None:
     library.sf_follow_size.argtypes = [_pointer]
     library.sf_negative.argtypes = [_pointer] * 5
     library.sf_follow.argtypes = [_pointer] * 10
+    library.sf_lowest_size.argtypes = [_pointer]
+    library.sf_lowest.argtypes = [*[_pointer] * 4, *[_double] * 3, *[_pointer] * 3]
     library.sf_independent.argtypes = [*[_pointer] * 5, _double, _double, _pointer]
     library.sf_trace_size.argtypes = [_pointer]
     library.sf_trace.argtypes = [_pointer] * 8

@@ -530,6 +530,17 @@ class Equations:
         core, system = self._with_system
         return core.negative(system, doubles(entries), counting)
 
+    def lowest(
+        self, entries: Array, weight: Array, shift: float, least: float, dual: float
+    ) -> tuple[Array, Array] | None:
+        """The lowest eigenvalues (n,) of a matrix by the core, and their vectors (n, total); None without one, or where
+        they are not found.  Arguments are those of :meth:`.CoreModel.lowest`.
+        """
+        if self._with_system is None:
+            return None
+        core, system = self._with_system
+        return core.lowest(system, doubles(entries), weight, shift, least, dual)
+
     @property
     def solved_by_core(self) -> bool:
         """Whether the core solves for steps with the matrix of these equations, too: not where it has many entries."""

@@ -26,6 +26,7 @@ from .tables import Acting
 from .terms import rotation_gradient
 
 __all__ = [
+    "BLOCK",
     "UNLOADED",
     "CoreLayout",
     "CoreModel",
@@ -41,6 +42,9 @@ __all__ = [
 
 UNLOADED = 1e-6
 """Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
+
+BLOCK = 4
+"""How many of the lowest eigenvalues the core finds at once, ``SF_BLOCK``."""
 
 StateParts = tuple[Array, Array, Array, Array]
 """Rotations, displacements, multipliers, and values near which angles count, see :class:`~.equations.State`."""
@@ -659,6 +663,18 @@ class CoreModel:
             # From the beginning: the matrix of the last step is not known any more.
             system.make_room()
             ctypes.pointer(way)[0] = begun
+
+    def lowest(
+        self, system: CoreSystem, entries: Array, weight: Array, shift: float, least: float, dual: float
+    ) -> tuple[Array, Array] | None:
+        """The lowest eigenvalues (n,) and their vectors (n, total), see ``sf_lowest``; None where not found."""
+        values, vectors = np.empty(BLOCK), np.empty((BLOCK, self.total))
+        memory = np.empty(self.library.sf_lowest_size(self.address))
+        given = (system.address, entries.ctypes.data, weight.ctypes.data)
+        found = (values.ctypes.data, vectors.ctypes.data, memory.ctypes.data)
+        while (broken := self.library.sf_lowest(self.address, *given, shift, least, dual, *found)) == NO_ROOM:
+            system.make_room()
+        return None if broken else (values, vectors)
 
     def independent(self, columns: Sequence[Array], entries: Array, roughly: float, usual: float) -> bool:
         """Whether rows clearly do not depend on each other, see ``sf_independent``.

@@ -30,6 +30,7 @@ from ..mathematics.arrays import Array
 from ..mathematics.core import Counting
 from ..mathematics.linear import BLURRED, MISSES, InertiaSolver, Product, SparseSolver, blurred
 from ..mechanics.equations import Equations, Point
+from ..mechanics.evaluation import BLOCK
 from .redundancy import independent
 from .sides import Sides, alike
 
@@ -168,7 +169,8 @@ class StabilityTest:
         if self._is_graded(limit):
             values, vectors, negative, limit = self._most_doubtful(point, entries)
         else:
-            values, vectors, negative = (self._dense if self._is_dense else self._sparse)(point, entries, limit)
+            found = self._lowest(point, limit) if self._is_dense else self._sparse(point, entries, limit)
+            values, vectors, negative = found or self._dense(point, entries, limit)
         if not len(values):
             return Stability(True, 0, np.inf, np.zeros(rotation_unknowns), nothing)
         stable: bool | str = bool(values[0] > limit)
@@ -356,6 +358,21 @@ class StabilityTest:
             return h, np.eye(self._n)
         basis = np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
         return basis.T @ h @ basis, basis
+
+    def _lowest(self, point: Point, limit: float) -> tuple[Array, Array, int] | None:
+        """The lowest eigenvalues and vectors by the core, of a stable state; None where it is none, or not found.
+
+        Where more eigenvalues may be alike than the core finds at once all of them are computed.
+        """
+        if self.counting is None or self._n - self.equations.rows < 2 * BLOCK:
+            return None
+        if self._clearly_negative(point.entries) != 0:
+            return None
+        found = self.equations.lowest(point.entries, self.counting[1], -limit, CONVERGED, DUAL)
+        if found is None or alike(found[0]) == BLOCK:
+            return None
+        values, vectors = found
+        return values, np.sqrt(self._weights)[:, None] * vectors[: alike(values), self._chosen].T, 0
 
     def _dense(self, point: Point, entries: Array, limit: float) -> tuple[Array, Array, int]:
         projected, basis = self._projected(entries, self._rows(point))
@@ -571,6 +588,9 @@ class StabilityTest:
             last = values[nearest]
         return values[nearest], block[:, nearest]
 
+
+CONVERGED, DUAL = 1e-12, 1e-14
+"""Change of the lowest eigenvalues, share of them, at which the core has found them; dual regularisation there."""
 
 DEEPER = 4.0
 """Factor by which the bound of :meth:`StabilityTest.depth` grows until no eigenvalue is below it."""
