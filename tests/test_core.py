@@ -176,6 +176,51 @@ def test_signs_of_eigenvalues_where_rows_depend_on_each_other():
     assert told < 100
 
 
+def beside_each_other(count):
+    """So many equal cantilevers, which know nothing of each other."""
+    nodes = {f"a{i}": {"position": [0, i], "support": "clamped"} for i in range(count)}
+    nodes |= {f"b{i}": {"position": [1, i]} for i in range(count)}
+    return {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": nodes,
+        "members": {f"m{i}": {"nodes": [f"a{i}", f"b{i}"], "section": "s"} for i in range(count)},
+        "loads": {f"p{i}": {"type": "force", "node": f"b{i}", "value": [-1.0, 0.5]} for i in range(count)},
+    }
+
+
+ALIKE = {"one": 1, "two": 2, "three": 3, "four": None, "linked": 1, "hinged_space": 1, "linked_space": 1}
+"""Eigenvalues that equal the lowest one; where there are as many as the core finds at once it does not tell."""
+
+
+@pytest.mark.parametrize("name", ALIKE)
+def test_lowest_eigenvalues_are_those_of_all(name):
+    counts = {"one": 1, "two": 2, "three": 3, "four": 4}
+    table = beside_each_other(counts[name]) if name in counts else EVERYTHING[name]()
+    prepared = Prepared(model_of(table, 3, 3))
+    loading, test = prepared.model.loading(0.2), prepared._test
+    solved = prepared.correct(prepared.equations.start(loading), loading)
+    assert solved.converged
+    entries = test._weighted(solved.point)
+    limit = test._limit(entries)
+    mine, other = test._lowest(solved.point, limit), test._dense(solved.point, entries, limit)
+    if ALIKE[name] is None:
+        assert mine is None
+        return
+    assert mine[1].shape[1] == other[1].shape[1] == ALIKE[name]
+    # Of all eigenvalues rounding leaves 1e-16 of the largest one.
+    rounding = 1e-14 * other[0][-1] + 1e-11 * other[0][0]
+    assert np.abs(mine[0][: ALIKE[name]] - other[0][: ALIKE[name]]).max() <= rounding
+    np.testing.assert_allclose(np.linalg.svd(mine[1].T @ other[1], compute_uv=False), 1.0, atol=1e-9)
+
+
+def test_lowest_eigenvalues_of_what_is_unstable_are_not_told():
+    prepared = Prepared(model_of(cantilever((-10.0, 0.0)), 2))
+    loading = prepared.model.loading(1.0)
+    point = prepared.equations.at(prepared.equations.start(loading), loading)
+    assert prepared._test._dense(point, prepared._test._weighted(point), 1e-9)[2] == 1
+    assert prepared._test._lowest(point, 1e-9) is None
+
+
 AFAR = [
     "cantilever_tip_force",
     "bend_45_degrees",
