@@ -447,6 +447,29 @@ def test_loose_rows_by_inverse_iteration_are_those_of_all_singular_values(name):
     np.testing.assert_allclose(few @ few.T, loose @ loose.T, atol=1e-6)
 
 
+@pytest.mark.parametrize("name", [*SYSTEMS, "four_bar", "hinged_space", "redundant"])
+def test_the_core_tells_of_rows_what_is_told_without_it(name):
+    """In the undeformed state, of its rows as they are and of the same with one of them nearly as another one."""
+    table = redundant() if name == "redundant" else EVERY[name]()
+    equations = Equations(model_of(table, 2, 3))
+    if not (equations.rows and equations.by_core):
+        pytest.skip("no rows, or no core here")
+    nothing, usual = equations.model.loading(0.0), redundancy.usual_square(equations)
+    point, rng = equations.at(equations.start(nothing), nothing), np.random.default_rng(3)
+    chosen, row, _ = equations.jacobian_entries
+    told = []
+    for size in (1.0, 1e-1, 1e-3, 1e-6):
+        entries = point.entries.copy()
+        entries[chosen[row == 0]] *= size
+        entries[chosen] *= rng.uniform(0.5, 2.0) if size < 1.0 else 1.0
+        here = replace(point, entries=entries)
+        other = redundancy._clearly_independent(redundancy._products(equations, here), usual)
+        told.append(equations.clearly_independent(entries, redundancy.ROUGHLY, usual))
+        assert told[-1] == other
+    assert told[0] == (name != "redundant")
+    assert not told[-1]
+
+
 @pytest.mark.parametrize("slack", [redundancy.SLACK, redundancy.NEARLY])
 @pytest.mark.parametrize("name", [*SYSTEMS, "four_bar", "hinged_space", "redundant"])
 def test_one_vector_shows_whether_rows_of_large_models_are_loose(name, slack, monkeypatch):
