@@ -630,6 +630,18 @@ class Lines:
                 marks[member] &= ~short
         return marks
 
+    def on_planes(self, found: Solved) -> dict[str, Array]:
+        """Marks of the elements, by member, that lie on a plane all along."""
+        mesh = found.model.mesh
+        marks = {name: np.zeros(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
+        for key, stretches in self.stretches(found).items():
+            stop, member = self.closest.pairs[key].stop, key[1][0]
+            if stop is None or stop.kind != "flat":
+                continue
+            for stretch in stretches:
+                marks[member] |= (mesh.cuts[member][:-1] >= stretch[0]) & (mesh.cuts[member][1:] <= stretch[-1])
+        return marks
+
     def rough_ends(self, found: Solved, accuracy: float) -> dict[str, Array]:
         """Marks of the elements, by member, in which lines end and where that is therefore not known well enough.
 

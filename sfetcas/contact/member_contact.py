@@ -632,16 +632,13 @@ class MemberContact:
                     if number is not None:
                         y[number] = way
 
-    def resolved(
-        self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float = 0.0, *, steady: bool = False
-    ) -> Solved | None:
+    def resolved(self, mesh: Mesh, points: Points, source: Solved, way: Way, drag: float = 0.0) -> Solved | None:
         """The equilibrium in which nothing penetrates or pulls, from a near state; None if it is not found.
 
         Where it is known where lines end these places go on sliding; where that leads nowhere, or is not known, forces
         at ends of elements show where they end, and these slide from there.  Members touch each other at places that
         slide; where these lead nowhere, and the members are as near between them, along a line.  Rough ones then touch
-        at places that stay on the first member.  ``steady`` says that the source is the same equilibrium on another
-        mesh: there all points push that did, but for a few cases.
+        at places that stay on the first member.
         """
         lines = self.lines.keys
         # Those that stood in the step before go on so.
@@ -649,9 +646,7 @@ class MemberContact:
         if found is not None:
             return found
         known = self.lines.ends_slide(points)
-        if known and steady and not (drag or self.scene.rubs):
-            found = self._as_they_are(mesh, points, source, way)
-        if known and found is None:
+        if known:
             found = self._resolved(mesh, points, source, way, drag, True)
         if found is None and not (known and self.patient):
             self.lines.keys = lines
@@ -751,20 +746,6 @@ class MemberContact:
                     most = max(most, points, key=len)
             source, solved = found, True
         return None
-
-    def _as_they_are(self, mesh: Mesh, points: Points, source: Solved, way: Way) -> Solved | None:
-        """The equilibrium in which all given points push, those along lines where they are; None where they do not, or
-        nothing is known of some of them.
-
-        """
-        set_out = self.lines.set_out(mesh, points)
-        known = [self._known(source.fields, p) if len(p.members) == 1 and not any(p.slides) else p for p in set_out]
-        set_up = self.gripping.set_up(source.fields, mesh, known)
-        found = self._corrected(replace(mesh, points=set_up), source, way, None, 0.0)
-        if found is None or not self._taken(found) or self._changed(found, set(), False, True)[1]:
-            return None
-        self.lines.forget(found, mesh, points)
-        return found
 
     def _unseen(self, found: Solved) -> bool:
         """Whether members are inside of what they touched along lines of which nothing touches: these are none, then,
@@ -1112,7 +1093,7 @@ class MemberContact:
             for sliver in (SLIVER, AT_END) if ended else (SLIVER,):
                 mesh, fitted = self.lines.fitted(now, points, prescribed=prescribed, sliver=sliver)
                 if there is None and not mesh.same(tried):
-                    there, tried = self.resolved(mesh, fitted, found, way, steady=True), mesh
+                    there, tried = self.resolved(mesh, fitted, found, way), mesh
                     if there is not None and tangents_turned(found.fields, there.fields) > STRIDE:
                         there = None
                     if there is not None and ended and not self.lines.ends_slide(points_of(there)):

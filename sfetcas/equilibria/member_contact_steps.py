@@ -58,11 +58,6 @@ in the middle would be in balance between its two ways down.
 POINTED = 0.1
 """Rotation, over the accuracy, up to which a short line is taken for a point."""
 
-UNFELT = 0.03
-"""Share of the largest roughness up to which elements leave nothing that halving them would tell: errors of positions
-are its square.  Members that lie on a plane are so.
-"""
-
 LEFT = "left an equilibrium that is unstable on the fine mesh only"
 """A note."""
 
@@ -269,10 +264,9 @@ class MemberContactSteps:
             if self.meshes.prescribed:
                 marks = {name: np.ones(len(long), bool) for name, long in marks.items()}
             else:
-                rough = roughness(now.fields)
-                felt = rough > UNFELT * rough.max(initial=0.0)
-                some = {n: long & felt[now.model.elements_of(n)] for n, long in marks.items() if n in now.model.members}
-                marks = some if any(marked.any() for marked in some.values()) else marks
+                # What lies on a plane is straight on any mesh.
+                flat = run.lines.on_planes(now)
+                marks = {name: long & ~flat[name] for name, long in marks.items()}
             finer = self._onto(now.model.mesh.refined(marks, now.fields.kinks), now, factor)
             difference, error = self.meshes.judged(now, finer)
             if self.meshes.prescribed:
@@ -311,8 +305,7 @@ class MemberContactSteps:
             It is not found there.
         """
         mesh, run = replace(mesh, points=()), self.run
-        points = run.lines.points_on(mesh, found)
-        there = run.resolved(mesh, points, found, lambda model: model.loading(factor), steady=True)
+        there = run.resolved(mesh, run.lines.points_on(mesh, found), found, lambda model: model.loading(factor))
         if there is None or tangents_turned(found.fields, there.fields) > NEAR:
             there = None if self.kept else run.relaxed(mesh, found, lambda model: model.loading(factor))
             if there is not None and tangents_turned(found.fields, there.fields) > NEAR:
