@@ -65,6 +65,13 @@ def drawn(ranges, count=6, seed=0):
     return {name: rng.uniform(*span, count) for name, span in ranges.items()}
 
 
+def blade(rotating=(0.0, 0.0, 1.0), **more):
+    """A cantilever with mass in axes that rotate, in space with two forces."""
+    table = cantilever((0.3, 0.5, 0.2)[: 3 if more else 2], analysis={"accuracy": ACCURACY}, **more)
+    table["sections"]["s"] |= {"rhoA": 1.0, "EI2": 0.5, "GJ": 0.7} if more else {"rhoA": 1.0}
+    return made({**table, "rotating": rotating})
+
+
 SCENES = {
     "plane": (beam, {"loads.tip.value.1": (-12.0, 12.0), "sections.s.EI3": (0.7, 1.5)}, ["nodes.B.position"]),
     "stretching": (
@@ -103,6 +110,16 @@ SCENES = {
         lambda: of("fourbar_curved_coupler"),
         {"factor": (-35.0, 40.0), "springs.return.stiffness": (2.0, 4.0)},
         ["nodes.C.position"],
+    ),
+    "rotating": (
+        blade,
+        {"rotating.2": (-4.0, 4.0), "loads.tip.value.1": (-3.0, 3.0), "sections.s.rhoA": (0.2, 2.0)},
+        ["nodes.B.position", "reactions.A.force"],
+    ),
+    "rotating in space": (
+        lambda: blade(dimension="space"),
+        {"rotating.1": (-1.0, 1.0), "rotating.2": (-3.0, 3.0), "loads.tip.value.2": (-1.0, 1.0)},
+        ["nodes.B.position", "reactions.A.force"],
     ),
     "discs": (lambda: of("tendon_robot_discs"), {"sections.wire.E": (4e10, 6e10)}, ["nodes.tip.position"]),
 }
@@ -157,6 +174,24 @@ def test_columns_near_and_beyond_their_critical_load_are_left():
     found = sweep(beam((-1.0, 0.0)), cases, ["nodes.B.position"], batch=True)
     assert sorted(found.outcomes.own) == [1, 2, 3]
     assert np.abs(found.quantities["nodes.B.position"][0] - [1.0, 0.0, 0.0]).max() <= ACCURACY
+
+
+def test_shafts_near_and_beyond_their_critical_speed_are_left():
+    """One along its axis of rotation is straight up to 3.516 rad/s, and bent beyond."""
+    scene = blade((1.0, 0.0, 0.0), dimension="space").replace(
+        {"sections.s.EI2": 1.0, "sections.s.EI3": 1.0, "loads.tip.value": [0.0, 1e-3, 0.0]}
+    )
+    speeds = [0.0, 2.0, 3.3, 3.51599, 4.5]
+    found = sweep(scene, {"rotating.0": speeds}, ["nodes.B.position"], batch=True)
+    assert found.outcomes.own.keys() == {3, 4}
+    aside = np.linalg.norm(found.quantities["nodes.B.position"][:, 1:], axis=1)
+    # By small deflections the fourth derivative of the shape is the square of the speed times the shape.
+    assert aside[0] == pytest.approx(1e-3 / 3.0, rel=1e-5)
+    s = np.sqrt(speeds[1:3])
+    dip = (np.sin(s) * np.cosh(s) - np.cos(s) * np.sinh(s)) / (s**3 * (1.0 + np.cos(s) * np.cosh(s)))
+    np.testing.assert_allclose(aside[1:3], 1e-3 * dip, rtol=1e-3)
+    assert found.table["status"][4] == "solved"
+    assert aside[4] > 0.3
 
 
 def test_of_several_steps_the_last_one_is_told():
@@ -238,7 +273,7 @@ def test_numbers_that_are_more_than_numbers_are_checked_against_models_made_anew
     assert (apart[found.solved] <= 2.0 * errors[found.solved]).all()
 
 
-@pytest.mark.parametrize("name", ["arch", "space"])
+@pytest.mark.parametrize("name", ["arch", "space", "rotating", "rotating in space"])
 def test_a_row_is_the_model_of_its_case(name):
     """Data and loads from the functions of all numbers, against a model that is assembled for each."""
     make, ranges, quantities = SCENES["closed" if name == "arch" else name]

@@ -155,7 +155,6 @@ def _extraordinary(scene: Scene, settings: Settings) -> str:
         "laws with limits": scene.limited or scene.limited_on_ways,
         "histories": bool(scene.histories),
         "tubes": bool(scene.tubes),
-        "rotating axes": scene.rotating is not None,
         "relaxation": any(section.relaxation for section in scene.sections.values()),
         "start places": scene.started,
         "accuracy of a single quantity": bool(settings.accuracy_of or scene.analysis.accuracy_of),
@@ -211,8 +210,6 @@ class PlainCases:
         equations = prepared.equations
         if not model.has_potential or not model.minimisable:
             return "loads without potential"
-        if model.loaded_at_zero:
-            return "loads at factor zero"
         if not np.isnan(model.unwrapping.prescribed(model.rotations.kind, loading)).all():
             return "angles that are counted and prescribed"
         if equations.apart() is None:
