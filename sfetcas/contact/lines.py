@@ -630,16 +630,19 @@ class Lines:
                 marks[member] &= ~short
         return marks
 
-    def on_planes(self, found: Solved) -> dict[str, Array]:
-        """Marks of the elements, by member, that lie on a plane all along."""
-        mesh = found.model.mesh
+    def straight(self, found: Solved) -> dict[str, Array]:
+        """Marks of the elements, by member, that lie on a plane all along, or on a cylinder along its axis."""
+        mesh, fields = found.model.mesh, found.fields
         marks = {name: np.zeros(len(cuts) - 1, bool) for name, cuts in mesh.cuts.items()}
         for key, stretches in self.stretches(found).items():
             stop, member = self.closest.pairs[key].stop, key[1][0]
-            if stop is None or stop.kind != "flat":
+            if stop is None:
                 continue
+            cuts = mesh.cuts[member]
+            _, tangents = fields.seen(key[0], fields.positions(member, cuts), fields.tangents(member, cuts))
+            along = np.linalg.norm(tangents @ stop.across, axis=1) < tolerances.PARALLEL
             for stretch in stretches:
-                marks[member] |= (mesh.cuts[member][:-1] >= stretch[0]) & (mesh.cuts[member][1:] <= stretch[-1])
+                marks[member] |= (cuts[:-1] >= stretch[0]) & (cuts[1:] <= stretch[-1]) & along[:-1] & along[1:]
         return marks
 
     def rough_ends(self, found: Solved, accuracy: float) -> dict[str, Array]:

@@ -264,9 +264,9 @@ class MemberContactSteps:
             if self.meshes.prescribed:
                 marks = {name: np.ones(len(long), bool) for name, long in marks.items()}
             else:
-                # What lies on a plane is straight on any mesh.
-                flat = run.lines.on_planes(now)
-                marks = {name: long & ~flat[name] for name, long in marks.items()}
+                # What is straight by what it lies on is so on any mesh.
+                straight = run.lines.straight(now)
+                marks = {name: long & ~straight[name] for name, long in marks.items()}
             finer = self._onto(now.model.mesh.refined(marks, now.fields.kinks), now, factor)
             difference, error = self.meshes.judged(now, finer)
             if self.meshes.prescribed:
