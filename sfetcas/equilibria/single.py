@@ -78,7 +78,7 @@ def cold(prepared: Prepared, loading: Loading, solver: SolverName = "ipopt") -> 
         followed = follow(prepared, loading.scaled, start, switch_branch=False)
         if not followed.reached:
             raise SolveError(Status.FAILED, "the loads could not be followed from zero", followed.state)
-        return followed.found, 0, "growing"
+        return prepared.correct(followed.state, loading), 0, "growing"
     state, gap = prepared.guess(loading)
     if gap > 0.2:
         equations = prepared.equations

@@ -403,7 +403,7 @@ class Ways:
             result = follow(pilot, way, state, switch_branch=False, **more)
         if not result.reached:
             return None
-        solved = result.found
+        solved = pilot.correct(result.state, way(1.0))
         notes = tuple(f"jumped {_at(part, factors)}: {JUMPED}" for part in result.left)
         if not energy_known and self.meshes.switch_branch and solved.stability.negative:
             notes += (KEPT,)

@@ -490,17 +490,16 @@ class Equations:
 
     def followed(
         self, state: State, tangent: Array, way: Way, limits: Limits, counting: Counting | None
-    ) -> tuple[State, tuple[Point, Report] | None] | None:
-        """Growing loads followed by the core: the last equilibrium and, where the way ends, the equations there and how
-        that was found; None without a core.
+    ) -> tuple[State, bool] | None:
+        """Growing loads followed by the core: the last equilibrium, and whether the way ends; None without a core.
 
         Arguments are those of :meth:`.CoreModel.follow`.
         """
         if self._with_system is None:
             return None
         core, system = self._with_system
-        there, ended = core.follow(system, _arrays(state), doubles(tangent), way, limits, counting)
-        return State(*there), None if ended is None else (self._point_of(ended[0]), ended[1])
+        there, reached = core.follow(system, _arrays(state), doubles(tangent), way, limits, counting)
+        return State(*there), reached
 
     def traced(self, curve: Curve, limits: Limits, counting: Counting) -> bool | None:
         """Plain steps along a curve by the core, which are written to it: whether its room is filled.

@@ -631,9 +631,8 @@ class CoreModel:
         way: c.Way,
         limits: c.Limits,
         counting: c.Counting | None,
-    ) -> tuple[StateParts, tuple[CorePoint, c.Report] | None]:
-        """Follow growing loads from a state: the last equilibrium and, where the way ends, the equations there and how
-        that was found.
+    ) -> tuple[StateParts, bool]:
+        """Follow growing loads from a state: the last equilibrium, and whether the way ends.
 
         Parameters
         ----------
@@ -659,7 +658,7 @@ class CoreModel:
             addressed = (*addresses, ctypes.addressof(handed), *rest)
             ended = self.library.sf_follow(self.address, system.address, *addressed)
             if ended != NO_ROOM:
-                return self._parted(there), None if ended else (point, report)
+                return self._parted(there), not ended
             # From the beginning: the matrix of the last step is not known any more.
             system.make_room()
             ctypes.pointer(way)[0] = begun

@@ -22,7 +22,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from .newton import Limits
 from .prepared import Prepared, Solved
-from .redundancy import redundant, with_sharing
+from .redundancy import redundant
 from .residuals import relative_residual
 
 __all__ = [
@@ -99,22 +99,17 @@ class Followed:
 
     Attributes
     ----------
-    found : Solved
-        What was found at the end of the way, or where it was lost.
+    state : State
+        State at the end of the way, or where it was lost.
     reached : bool
         Whether the end of the way was reached.
     left : tuple of float
         Parts of the way at which an unstable equilibrium was left.
     """
 
-    found: Solved
+    state: State
     reached: bool
     left: tuple[float, ...]
-
-    @property
-    def state(self) -> State:
-        """State at the end of the way, or where it was lost."""
-        return self.found.state
 
 
 def between(model: Model, begin: float, end: float) -> Callable[[float], Loading]:
@@ -202,7 +197,7 @@ def follow(
     begin = _On(_begun(prepared, state, way(0.0)), 0.0)
     plainly = following.plainly(begin, whole, tries)
     here, reached = advanced(*plainly[:2], following.trial, lambda here: here.done >= 1.0, tries=plainly[2])
-    return Followed(here.found, reached, tuple(following.left))
+    return Followed(here.found.state, reached, tuple(following.left))
 
 
 def _begun(prepared: Prepared, state: State, loading: Loading) -> Solved:
@@ -279,14 +274,7 @@ class _Following:
             return usual
         if way.done == 0.0:
             return begin, way.step, way.tries
-        there, loading, ended = found[0], self.way(way.done), found[1]
-        if ended is None:
-            return _On(Solved.taken(prepared, there, loading), way.done), way.step, way.tries
-        point, report = ended
-        there, point = with_sharing(prepared.equations, there, loading, point, report.tolerance)
-        residual = relative_residual(prepared.equations, point)
-        solved = Solved(prepared, there, loading, point, residual, iterations=report.iterations)
-        return _On(solved, 1.0), way.step, way.tries
+        return _On(Solved.taken(prepared, found[0], self.way(way.done)), way.done), way.step, way.tries
 
     def trial(self, here: _On, step: float) -> tuple[_On | None, float]:
         """The next point, None if the step is refused, and the length of the next step, parts of the way."""

@@ -16,7 +16,7 @@ from ..description.showing import shown
 from ..errors import SolveError, Status
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
-from ..mathematics.core import Counting, Report, Way, integers
+from ..mathematics.core import Counting, Way, integers
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt, NLPResult
 from ..mechanics.equations import Equations, Point, State
@@ -186,7 +186,7 @@ class Prepared:
 
     def followed(
         self, begin: Solved, rate: Loading, way: Way, limits: Limits, *, counted: bool
-    ) -> tuple[State, tuple[Point, Report] | None] | None:
+    ) -> tuple[State, bool] | None:
         """Growing loads followed by the core from an equilibrium, as far as it can: see :meth:`.Equations.followed`.
 
         Parameters
