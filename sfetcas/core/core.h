@@ -325,7 +325,7 @@ SF_PUBLIC int sf_lowest(const sf_model *model, sf_system *system, const double *
 
 /* What is told of a point of a curve. */
 typedef struct {
-  double factor, arc, residual, first, second;
+  double factor, arc, residual;
   int iterations, negative, doubtful;
 } sf_told_of;
 

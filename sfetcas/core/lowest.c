@@ -9,14 +9,6 @@
 
 int sf_lowest_size(const sf_model *m) { return m->entry_count + (2 * SF_BLOCK + 4) * m->total; }
 
-/* Inner product of two vectors by weights. */
-static double sf_weighed(int n, const double *weight, const double *a, const double *b) {
-  double sum = 0.0;
-  int i;
-  for (i = 0; i < n; ++i) sum += a[i] * (weight[i] * b[i]);
-  return sum;
-}
-
 /* Eigenvalues of a small symmetric matrix, rising, and its vectors as columns, by rotations of Jacobi. */
 static void sf_jacobi(double a[SF_BLOCK][SF_BLOCK], double *values, double v[SF_BLOCK][SF_BLOCK]) {
   int sweep, i, j, k;

@@ -43,12 +43,17 @@ static int sf_make_along(const sf_model *m, double *memory, sf_along *along) {
 
 int sf_trace_size(const sf_model *m) { return sf_make_along(m, NULL, NULL); }
 
-/* Inner product of two directions, see Curve.inner. */
-static double sf_inner(const sf_model *m, const sf_curve *curve, const double *a, const double *b) {
+/* Inner product of two vectors by weights. */
+static double sf_weighed(int n, const double *weight, const double *a, const double *b) {
   double sum = 0.0;
   int i;
-  for (i = 0; i < m->total; ++i) sum += a[i] * (curve->metric[i] * b[i]);
-  return sum + a[m->total] * b[m->total] / (curve->unit * curve->unit);
+  for (i = 0; i < n; ++i) sum += a[i] * (weight[i] * b[i]);
+  return sum;
+}
+
+/* Inner product of two directions, see Curve.inner. */
+static double sf_inner(const sf_model *m, const sf_curve *curve, const double *a, const double *b) {
+  return sf_weighed(m->total, curve->metric, a, b) + a[m->total] * b[m->total] / (curve->unit * curve->unit);
 }
 
 /* Largest angle between the rotations of two states, which come first in their numbers; plane angles count whole turns. */
@@ -116,7 +121,7 @@ int sf_independent(const sf_model *m, const int *column, const int *line, const 
 static int sf_tangent(const sf_model *m, sf_system *system, const sf_curve *curve, const sf_border *border,
                       const sf_limits *limits, const sf_state *s, const sf_point *p, const double *before,
                       double *tangent, int *doubtful, sf_along *along) {
-  double *answer = along->both + m->total, size = 0.0, length;
+  double *answer = along->both + m->total, length;
   int i, broken;
   sf_rate(m, border, border->factor, s, p, along->right, along->given, along->results);
   sf_regularise(m, p->entries, limits, along->matrix);
@@ -129,8 +134,7 @@ static int sf_tangent(const sf_model *m, sf_system *system, const sf_curve *curv
   broken = sf_solve(system, along->matrix, 2, along->right, along->both, along->solving);
   if (broken) return broken;
   if (!sf_all_finite(along->both, 2 * m->total)) return 1;
-  for (i = 0; i < m->rotation_unknowns; ++i) size += answer[i] * (limits->weight[i] * answer[i]);
-  *doubtful = size > curve->doubt * curve->doubt;
+  *doubtful = sf_weighed(m->rotation_unknowns, limits->weight, answer, answer) > curve->doubt * curve->doubt;
   sf_copy(tangent, along->both, m->total);
   tangent[m->total] = 1.0;
   length = sqrt(sf_inner(m, curve, tangent, tangent));
@@ -219,8 +223,6 @@ int sf_trace(const sf_model *m, sf_system *system, sf_curve *curve, const sf_lim
     next->factor = border.factor;
     next->arc = now->arc + length;
     next->residual = report->residual;
-    next->first = report->steps > 0 ? report->first : 0.0;
-    next->second = report->steps > 1 ? report->second : 0.0;
     next->iterations = report->iterations;
     /* As much longer as the angle and the effort of this one allow. */
     growth = curve->turning / sf_acos(cosine < 1.0 ? cosine : 1.0);

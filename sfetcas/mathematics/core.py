@@ -285,7 +285,7 @@ class Told(ctypes.Structure):
     """``sf_told_of``."""
 
     _fields_ = (
-        *((name, _double) for name in ("factor", "arc", "residual", "first", "second")),
+        *((name, _double) for name in ("factor", "arc", "residual")),
         *((name, _int) for name in ("iterations", "negative", "doubtful")),
     )
 

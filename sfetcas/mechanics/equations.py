@@ -501,15 +501,14 @@ class Equations:
         there, reached = core.follow(system, _arrays(state), doubles(tangent), way, limits, counting)
         return State(*there), reached
 
-    def traced(self, curve: Curve, limits: Limits, counting: Counting) -> bool | None:
-        """Plain steps along a curve by the core, which are written to it: whether its room is filled.
+    def trace(self, curve: Curve, limits: Limits, counting: Counting) -> None:
+        """Plain steps along a curve by the core, which are written to it; it has to be one that solves for them.
 
-        None without a core.  Arguments are those of :meth:`.CoreModel.trace`.
+        Arguments are those of :meth:`.CoreModel.trace`.
         """
-        if self._with_system is None:
-            return None
+        assert self._with_system is not None
         core, system = self._with_system
-        return core.trace(system, curve, limits, counting)
+        core.trace(system, curve, limits, counting)
 
     def for_search(self, varying: Sequence[int]) -> tuple[CoreModel, CoreSystem] | None:
         """The core's model and its system for the globalised Newton method, with data of their own where these vary.
@@ -699,8 +698,6 @@ class Equations:
     def undeformed_entries(self) -> Array:
         """Entries of the Newton matrix in the undeformed state without loads."""
         rest, nothing = self._at_rest()
-        if self._core is not None:
-            return self._core.at(_arrays(rest), self.given(nothing)).entries
         return self.at(rest, nothing).entries
 
     def elastic_entries(self) -> Array:

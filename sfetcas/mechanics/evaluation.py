@@ -690,8 +690,8 @@ class CoreModel:
         rows = self._handed.structure.rows
         return np.zeros(rows * (rows + 1))
 
-    def trace(self, system: CoreSystem, curve: c.Curve, limits: c.Limits, counting: c.Counting) -> bool:
-        """Plain steps along a curve, which are written to it, see ``sf_trace``: whether its room is filled.
+    def trace(self, system: CoreSystem, curve: c.Curve, limits: c.Limits, counting: c.Counting) -> None:
+        """Plain steps along a curve, which are written to it, see ``sf_trace``.
 
         Parameters
         ----------
@@ -705,10 +705,7 @@ class CoreModel:
         """
         point, report, given = CorePoint(self), c.Report(), (limits, counting)
         rest = (*map(ctypes.addressof, given), point.address, self._tracing.ctypes.data, ctypes.addressof(report))
-        while True:
-            ended = self.library.sf_trace(self.address, system.address, ctypes.addressof(curve), *rest)
-            if ended != NO_ROOM:
-                return not ended
+        while self.library.sf_trace(self.address, system.address, ctypes.addressof(curve), *rest) == NO_ROOM:
             system.make_room()
 
     @functools.cached_property

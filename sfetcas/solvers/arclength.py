@@ -436,6 +436,8 @@ class Curve:
     ) -> list[Standing]:
         """Points beyond one, as far as steps are plain, see ``sf_trace``; none where the first step is not.
 
+        The curve is one :attr:`for_steps`.
+
         Parameters
         ----------
         rules : Curve of the core
@@ -446,9 +448,12 @@ class Curve:
             Number of points at most.
         """
         equations, given = self.equations, self.for_core
-        counting = self.prepared.counting if self.for_steps else None
-        neutral = now.tangent.neutral is not None or now.inertia.zero > 0
-        if counting is None or given is None or neutral or (equations.rows and redundant(equations, now.point)):
+        counting = self.prepared.counting
+        assert given is not None
+        assert counting is not None
+        if equations.rows and equations.redundant is None:
+            redundant(equations, now.point)
+        if now.tangent.neutral is not None or now.inertia.zero or equations.redundant:
             return []
         room, total = 1 + most, equations.total
         start, now_state = (np.concatenate([part.ravel() for part in vars(one.state).values()]) for one in (first, now))
@@ -471,7 +476,7 @@ class Curve:
             rules.before, rules.arc_before = last.ctypes.data, before.arc
         rules.state, rules.tangent, rules.told = states.ctypes.data, tangents.ctypes.data, ctypes.addressof(told)
         rules.first, rules.first_factor = start.ctypes.data, first.factor
-        equations.traced(rules, limits, counting[0])
+        equations.trace(rules, limits, counting[0])
         del alive
         return [self._told(*one) for one in zip(told[1 : rules.points], states[1:], tangents[1:], strict=False)]
 
@@ -482,7 +487,7 @@ class Curve:
             self.equations.state(state),
             self.loading(told.factor),
             None,
-            *(told.residual, True, told.iterations, told.first, told.second),
+            *(told.residual, True, told.iterations),
             tangent=Tangent(tangent[:-1], float(tangent[-1])),
             arc=told.arc,
             doubtful=bool(told.doubtful),

@@ -368,7 +368,7 @@ class StabilityTest:
             return None
         if self._clearly_negative(point.entries) != 0:
             return None
-        found = self.equations.lowest(point.entries, self.counting[1], -limit, CONVERGED, DUAL)
+        found = self.equations.lowest(point.entries, self.counting[1], -limit, SETTLED, DUAL)
         if found is None or alike(found[0]) == BLOCK:
             return None
         values, vectors = found
@@ -554,7 +554,7 @@ class StabilityTest:
     def _solved(self, point: Point, shift: float, loads: Array) -> Array:
         """Solution (total, k) with the shifted Newton matrix, with dual regularisation for redundant rows."""
         equations = self.equations
-        for dual in (1e-14, 1e-12, 1e-10):
+        for dual in (DUAL, 1e-12, 1e-10):
             shifted = point.entries.copy()
             shifted[equations.diagonal[self._chosen]] -= shift * self._weights
             shifted[equations.diagonal[equations.unknowns :]] -= dual
@@ -573,7 +573,7 @@ class StabilityTest:
         loads, last = np.zeros((equations.total, width)), np.full(min(NEAREST, width), np.inf)
         shifted = point.entries.copy()
         shifted[equations.diagonal[self._chosen]] += SHIFT * self._weights
-        shifted[equations.diagonal[equations.unknowns :]] -= 1e-14
+        shifted[equations.diagonal[equations.unknowns :]] -= DUAL
         self._solver.factor(shifted)
         for _ in range(60):
             loads[self._chosen] = root * block
@@ -589,8 +589,11 @@ class StabilityTest:
         return values[nearest], block[:, nearest]
 
 
-CONVERGED, DUAL = 1e-12, 1e-14
-"""Change of the lowest eigenvalues, share of them, at which the core has found them; dual regularisation there."""
+SETTLED = 1e-12
+"""Change of the lowest eigenvalues, share of them, at which the core has found them."""
+
+DUAL = 1e-14
+"""Dual regularisation of inverse iteration, for redundant rows."""
 
 DEEPER = 4.0
 """Factor by which the bound of :meth:`StabilityTest.depth` grows until no eigenvalue is below it."""
