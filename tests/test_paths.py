@@ -166,6 +166,16 @@ def test_limit_points_of_lee_frame_with_few_elements():
         assert abs(entry.factor / reference - 1.0) < entry.certificate.error_estimate
 
 
+def test_pressure_that_bends_nothing_needs_few_elements():
+    """Ten times the first of its critical loads would wind up a beam that nothing closes to a ring."""
+    ring = table("ring_normal_pressure", range=[0, 10], accuracy=1e-6)
+    for member in ring["members"].values():
+        del member["element"], member["elements"]
+    path = solve(made(ring))
+    assert path.model.mesh.elements <= 16
+    assert [point.factor for point in path.branches[0].bifurcations] == pytest.approx([3.0, 8.0], rel=1e-6)
+
+
 def test_limit_point_of_the_215_degree_arch_with_few_elements():
     path = solve(made(table("arch_215_degrees", range=[0, 1000], points=40)), element="SFET5", elements=8)
     assert path.model.mesh.elements == 16

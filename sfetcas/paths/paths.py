@@ -298,9 +298,7 @@ class PathTracing:
         if self.fixed == set(self.scene.members):
             errors = self._errors(coarse, self._level(self._halved(mesh)), whose=coarse)
             return self._answer(coarse, errors, begin)
-        # The error falls by 4^p a halving; less is taken for granted, and no more where forces of contact are kinks.
-        order = min(mesh.order, LOW) if self.scene.contacts else mesh.order
-        gain, stalled = 1.0 if self.one_sequence else max(1.0, min(4.0**order / MARGIN, 2.0**order)), 0
+        gain, stalled = self._gain(mesh), 0
         for count in range(LEVELS):
             coarse = self._with_fronts(coarse)
             fine = self._level(self._halved(coarse.choices.mesh))
@@ -342,14 +340,29 @@ class PathTracing:
             mesh = self._halved(mesh) if 4 * mesh.elements <= MOST_ELEMENTS else mesh
         return fine if mesh is fine.choices.mesh else self._level(mesh)
 
+    def _gain(self, mesh: Mesh) -> float:
+        """What the error falls by in a halving: 4^p, of which less is taken for granted, and no more where forces of
+        contact are kinks.
+        """
+        order = min(mesh.order, LOW) if self.scene.contacts else mesh.order
+        return 1.0 if self.one_sequence else max(1.0, min(4.0**order / MARGIN, 2.0**order))
+
     def _first_mesh(self) -> Mesh:
-        """The mesh for the largest factor; where that needs many elements, for the largest that is met."""
+        """The mesh for the largest factor; where that needs many elements, for the largest that is met, or the one
+        without loads where samples of the path do not ask for more: loads need not bend what they act on.
+        """
         plain, graded = self._mesh((1e-9 * self._widest,)), self._mesh(self.span)
         if graded.elements <= max(2 * plain.elements, FEW_ELEMENTS):
             return graded
         choices = self.choices(plain)
-        met = [point.factor for point in choices.follow(choices.begin()[0], self.points).points]
-        return self._mesh((max(1.5 * min(met), self.span[0]), min(1.5 * max(met), self.span[1])))
+        first = choices.begin()[0]
+        traced = choices.follow(first, self.points)
+        met = [point.factor for point in traced.points]
+        graded = self._mesh((max(1.5 * min(met), self.span[0]), min(1.5 * max(met), self.span[1])))
+        if graded.elements <= 2 * plain.elements or self.one_sequence:
+            return graded
+        left = self._sampled(choices, first.curve, traced, self.choices(self._halved(plain)))
+        return plain if left <= self._gain(plain) * self.accuracy else graded
 
     def _mesh(self, factors: tuple[float, ...]) -> Mesh:
         """The mesh that statics begins with at the given factors."""
@@ -474,7 +487,7 @@ class PathTracing:
                     factor = abs(one.factor - other.factor) / max(abs(other.factor), tolerances.UNIT * self._widest)
                     errors[i, kind, j] = max(largest_difference(one.fields, other.fields), factor)
             if not self.one_sequence:
-                errors[i, "samples", 0] = self._sampled(coarse, a.traced, fine)
+                errors[i, "samples", 0] = self._sampled(coarse.choices, coarse.curve, a.traced, fine.choices)
                 continue
             chosen = chosen_of(coarse.curve, a.traced, STEADY, SAMPLES)
             met_at = functools.partial(self._met_at, fine)
@@ -501,12 +514,13 @@ class PathTracing:
     def _widest(self) -> float:
         return max(map(abs, self.span))
 
-    def _sampled(self, coarse: _Level, traced: Followed, fine: _Level) -> float:
+    @staticmethod
+    def _sampled(coarse: Choices, curve: Curve, traced: Followed, fine: Choices) -> float:
         """Largest difference of points of a coarse stretch when they are corrected on the fine mesh."""
         largest = 0.0
-        for point in chosen_of(coarse.curve, traced, STEADY, SAMPLES):
-            own = coarse.choices.again(point) or point
-            found = fine.choices.again(own, own.factor)
+        for point in chosen_of(curve, traced, STEADY, SAMPLES):
+            own = coarse.again(point) or point
+            found = fine.again(own, own.factor)
             if found is not None:
                 largest = max(largest, largest_difference(own.fields, found.fields))
         return largest
