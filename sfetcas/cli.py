@@ -1,4 +1,4 @@
-"""The command line: run, check, info, sweep, trade, export."""
+"""The command line: run, page, check, info, sweep, trade, export."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from .errors import SceneError, SolveError, Status
 from .mechanics.elements import ELEMENTS
 from .mechanics.model import assemble
 from .mechanics.resistance import check_resistance
-from .outputs import Output, outputs_of, outputs_of_sweep, outputs_of_trade
+from .outputs import Output, outputs_of, outputs_of_page, outputs_of_sweep, outputs_of_trade
 from .quoting import printable
 from .reports import print_checks, report, report_sweep
 from .solvers.prepared import Prepared
@@ -135,7 +135,7 @@ def parser() -> argparse.ArgumentParser:
     )
     found.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = found.add_subparsers(required=True, metavar="COMMAND")
-    for add in (_add_run, _add_check, _add_info, _add_sweep, _add_trade, _add_export):
+    for add in (_add_run, _add_page, _add_check, _add_info, _add_sweep, _add_trade, _add_export):
         add(commands)
     return found
 
@@ -194,6 +194,20 @@ def _add_run(commands: Commands) -> None:
         "--matrices", type=Path, metavar="OUT", help="matrices of the small vibrations (modes): .npz or a new folder"
     )
     _add_settings(run)
+
+
+def _add_page(commands: Commands) -> None:
+    page = _command(
+        commands,
+        "page",
+        _page,
+        "Run the analysis of a scene and write a page for a browser, which turns, plays and tells its values",
+        "arch.toml arch.html",
+        "arch.toml arch.html --accuracy 1e-8",
+    )
+    _add_file(page)
+    page.add_argument("page", type=Path, metavar="OUT.html", help="the page: one file that needs no network")
+    _add_settings(page)
 
 
 def _add_check(commands: Commands) -> None:
@@ -433,6 +447,16 @@ def _run(options: argparse.Namespace) -> int:
             show(error.reached)
         raise
     show(solution)
+    return _verdict(solution, checks)
+
+
+def _page(options: argparse.Namespace) -> int:
+    begin = time.perf_counter()
+    scene, settings = load(options.file), _settings(options)
+    outputs = outputs_of_page(options)
+    solution, checks = _answered(options.file, scene, settings)
+    solved = time.perf_counter() - begin
+    _give(solution, lambda: report(solution, solved), outputs)
     return _verdict(solution, checks)
 
 

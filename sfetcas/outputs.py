@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import json
 import os
 import re
@@ -15,11 +17,12 @@ from typing import TYPE_CHECKING, Any
 from .description.scene import Scene
 from .errors import SceneError
 from .files import write_file, write_folder
+from .reports import report
 
 if TYPE_CHECKING:
     from .tradeoff.trading import Trade
 
-__all__ = ["Output", "outputs_of", "outputs_of_sweep", "outputs_of_trade"]
+__all__ = ["Output", "outputs_of", "outputs_of_page", "outputs_of_sweep", "outputs_of_trade"]
 
 Writer = Callable[[Any, Path], Any]
 """A function that writes an answer to a path."""
@@ -89,6 +92,31 @@ def outputs_of(options: argparse.Namespace, scene: Scene) -> list[Output]:
     if options.matrices is not None:
         found.append(_matrices(options.matrices, scene))
     return found
+
+
+def outputs_of_page(options: argparse.Namespace) -> list[Output]:
+    """The page that is asked for, checked before anything is solved.
+
+    Raises
+    ------
+    SceneError
+        Its ending is no page's, it cannot be written, or is the scene itself.
+    """
+    from .pages.page import check_page, page_of
+
+    path = options.page
+    check_page(path)
+    _check_writable(path)
+    if path.exists() and path.samefile(options.file):
+        raise SceneError(f"{path}: is the scene itself, accepted: another file")
+    source = options.file.read_text(encoding="utf-8")
+
+    def write(answer: Any, there: Path) -> None:
+        with contextlib.redirect_stdout(io.StringIO()) as said:
+            report(answer, sum(answer.seconds.values()))
+        there.write_text(page_of(answer, source, said.getvalue()), encoding="utf-8")
+
+    return [Output("OUT.html", path, write)]
 
 
 def outputs_of_trade(options: argparse.Namespace) -> list[Output]:

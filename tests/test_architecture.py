@@ -339,6 +339,9 @@ ORDER = [
     "pictures.animation",
     "pictures.paraview",
     "reports",
+    "pages",
+    "pages.content",
+    "pages.page",
     "outputs",
     "cli",
     "__init__",
@@ -403,8 +406,8 @@ PICTURES = (
 HEAVY = {"scipy", "tqdm"}
 """Packages that take long to import and that few runs need: they may be imported where they are used."""
 
-DRAWING = ("plot", "animate")
-"""Methods by which answers draw themselves: the only ones that import from the pictures, and only when they are called.
+DRAWING = ("plot", "animate", "page", "view")
+"""Methods by which answers draw themselves: the only ones that import from pictures and pages, and only when called.
 """
 
 PYPLOT = "pictures.showing"
@@ -488,11 +491,11 @@ def taken():
 
 @functools.cache
 def drawn_by_methods(name):
-    """Imports of pictures in the methods that draw, and of their types for type checkers."""
+    """Imports of pictures and pages in the methods that draw, and of their types for type checkers."""
     places = [n for n in nodes(name) if isinstance(n, ast.FunctionDef) and n.name in DRAWING]
     places += [n for n in nodes(name) if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING"]
     found = [n for place in places for n in ast.walk(place) if isinstance(n, ast.ImportFrom)]
-    return {n for n in found if n.module == "matplotlib.figure" or str(n.module).startswith("pictures.")}
+    return {n for n in found if n.module == "matplotlib.figure" or str(n.module).startswith(("pictures.", "pages."))}
 
 
 @functools.cache

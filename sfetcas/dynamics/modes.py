@@ -28,7 +28,7 @@ from ..equilibria import statics
 from ..equilibria.meshing import Meshing
 from ..equilibria.settings import Settings
 from ..equilibria.single import finished, solved_from
-from ..equilibria.solution import Equilibrium, heading, heading_in_words, touched_notes
+from ..equilibria.solution import Equilibrium, Viewed, heading, heading_in_words, touched_notes
 from ..equilibria.stops import solve_stopped
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import TINY, Array, first_of_largest
@@ -150,7 +150,7 @@ def _plain(entry: Mapping[str, Array]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class Modes(Viewed):
     """The answer of a scene whose analysis is ``modes``.
 
     Attributes

@@ -18,7 +18,7 @@ from ..description.answers import MOTION
 from ..description.records import counted, plain, say
 from ..description.showing import error_in_words, notes_in_words, number_in_words, shown
 from ..equilibria.quantities import WHERE, Quantity
-from ..equilibria.solution import Configuration, heading, heading_in_words
+from ..equilibria.solution import Configuration, Viewed, heading, heading_in_words
 from ..errors import SceneError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.threads import single_threaded
@@ -432,7 +432,7 @@ def apart_in(
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Viewed):
     """The answer of a dynamic analysis: the motion of a scene in time.
 
     Attributes

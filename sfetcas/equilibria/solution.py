@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path as File
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 
@@ -40,6 +40,7 @@ from ..solvers.stability import Stability
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from ..pages.page import View
     from ..pictures.animation import Animation
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "Configuration",
     "Equilibrium",
     "Solution",
+    "Viewed",
     "at_factor",
     "equilibrium",
     "heading",
@@ -513,8 +515,33 @@ class Equilibrium(Configuration):
         return {"factor": self.factor, **plain(tables), **proof, **told, "notes": list(self.notes)}
 
 
+class Viewed:
+    """What all answers have: they can be seen in a browser."""
+
+    def page(self, file: str | os.PathLike[str]) -> File:
+        """Write a page for a browser, ``.html``, that turns, plays and tells its values; its path.
+
+        One file, which asks for nothing else: it can be sent, kept and opened without a network.
+
+        Raises
+        ------
+        SceneError
+            Another ending, or a place that cannot be written.
+        """
+        from ..pages.page import save_page
+
+        save_page(cast("Any", self), file)
+        return File(file)
+
+    def view(self) -> View:
+        """The same page for a notebook: it is shown where this is the last value of a cell."""
+        from ..pages.page import View
+
+        return View(cast("Any", self))
+
+
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Viewed):
     """The answer of a static analysis: an equilibrium for each load factor of ``analysis.steps``.
 
     Where all equilibria are searched for, ``steps`` has several for a factor, the default one first.

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..description.records import counted, enumerated
 from ..description.showing import error_in_words, few, first_lines, notes_in_words, shown, stability_in_words
-from ..equilibria.solution import Configuration, Equilibrium, heading, heading_in_words
+from ..equilibria.solution import Configuration, Equilibrium, Viewed, heading, heading_in_words
 from ..errors import Status
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
@@ -206,7 +206,7 @@ class Branch:
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class Path(Viewed):
     """The answer of a scene whose analysis is a path.
 
     Attributes

@@ -26,7 +26,7 @@ from ..errors import SceneError
 from ..paths.path import Path
 from .colours import NONE, ColourQuantity, coloured
 from .files import check_ending, check_folder
-from .glyphs import sketch_supports
+from .glyphs import carried_along, sketch_supports
 from .modeshapes import PHASES, ModePanels
 from .motions import evenly
 from .sheet import DOTTED, Sheet, add_bar, axes_on, entitle, pieces_of, plot_line
@@ -44,8 +44,6 @@ QUICK_FRAMES = 101
 LASTS = 5.0
 """Seconds that steps and paths take, where they are many."""
 DPI = 100
-STANDING = ("support-", "contact-")
-"""Marks that do not turn with the structure."""
 
 
 def check_animation(scene: Scene, file: str | os.PathLike[str]) -> None:
@@ -331,14 +329,5 @@ class _Film(Film):
         self._sheet.drawn[:] = [self._sheet.draw(mark) for mark in self._marks(number)]
 
     def _marks(self, number: int) -> list[Mark]:
-        """Marks at a step: supports as at the first one, only carried along, so that they keep their sides."""
-        sketch = self._sketched(number)
-        carried = {f"contact-{name}" for name, contact in self._scene.contacts.items() if contact.node}
-        nodes = {f"support-{name}": sketch.at(name) - self._first.at(name) for name in self._scene.nodes}
-
-        def stands(mark: Mark) -> bool:
-            return mark.name.startswith(STANDING) and mark.name not in carried
-
-        moving = [mark for mark in sketch.marks if not stands(mark)]
-        standing = [mark for mark in self._first.marks if stands(mark)]
-        return [replace(mark, points=mark.points + nodes.get(mark.name, 0.0)) for mark in standing] + moving
+        """Marks at a step, of supports those of the first one, carried along."""
+        return carried_along(self._first, self._sketched(number))

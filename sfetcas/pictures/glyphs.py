@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,7 @@ from .sketch import (
     REACTION,
     TENDON,
     Ink,
+    Mark,
     Sketch,
     broken,
     dense,
@@ -44,7 +45,7 @@ from .sketch import (
     tangents_of,
 )
 
-__all__ = ["sketch_all", "sketch_supports"]
+__all__ = ["carried_along", "sketch_all", "sketch_loads", "sketch_supports"]
 
 ARROW = 0.12
 """Length of the longest arrow over the size of the picture; sizes below are shares of it, too."""
@@ -64,10 +65,34 @@ TURNS = {LOAD: 0.05, REACTION: 0.063, MOTION: 0.076}
 """Radii of circular arrows."""
 
 
+STANDING = ("support-", "contact-")
+"""Marks that do not turn with the structure."""
+
+
 def sketch_all(sketch: Sketch) -> None:
     """Sketch everything but the centre lines; what comes first has the free choice of place."""
     sketch_supports(sketch)
+    sketch_loads(sketch)
+
+
+def sketch_loads(sketch: Sketch) -> None:
+    """Add symbols of loads, motions, fields, magnets and reactions to a sketch."""
     _sketch_tables(sketch, LOADS)
+
+
+def carried_along(first: Sketch, sketch: Sketch) -> list[Mark]:
+    """Marks of a sketch of supports at another state than the first: these as there, only carried along, so that they
+    keep their sides.
+    """
+    carried = {f"contact-{name}" for name, contact in sketch.scene.contacts.items() if contact.node}
+    nodes = {f"support-{name}": sketch.at(name) - first.at(name) for name in sketch.scene.nodes}
+
+    def stands(mark: Mark) -> bool:
+        return mark.name.startswith(STANDING) and mark.name not in carried
+
+    moving = [mark for mark in sketch.marks if not stands(mark)]
+    standing = [mark for mark in first.marks if stands(mark)]
+    return [replace(mark, points=mark.points + nodes.get(mark.name, 0.0)) for mark in standing] + moving
 
 
 def sketch_supports(sketch: Sketch) -> None:

@@ -1,0 +1,397 @@
+"""What a page shows of an answer: members, symbols and values of each of its states, as tables for the viewer.
+
+Lengths are metres in fixed axes.  Places and values along members are packed as little-endian numbers, in double
+precision where there are few of them.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from ..description.answers import outlined
+from ..description.records import plain
+from ..dynamics.modes import Modes
+from ..dynamics.motion import Trajectory
+from ..equilibria.solution import Configuration, Solution
+from ..errors import SceneError
+from ..mathematics.arrays import TINY, Array
+from ..paths.path import Path
+from ..pictures.colours import QUANTITIES, ColourQuantity
+from ..pictures.glyphs import carried_along, sketch_loads, sketch_supports
+from ..pictures.sketch import Course, Sketch, in_short, prefix, tangents_of, view_of
+
+__all__ = ["Shown", "content_of"]
+
+Shown: TypeAlias = Solution | Path | Trajectory | Modes
+"""An answer that a page shows."""
+
+MOST_STATES = 200
+"""States of a path or a motion on a page; with more, some are passed over."""
+
+MOST_NUMBERS, EXACT_NUMBERS = 200_000, 40_000
+"""Numbers along members on a page, about 1 MB, and how many of them have double precision."""
+
+TURNING, FEWEST, MOST_PLACES = 0.06, 9, 401
+"""Turning, rad, between two places of a curved member, and places along a member, at least and at most."""
+
+SMOOTH = 25
+"""Places along a member whose values change, where there is room."""
+
+LISTED = 20
+"""States up to which members are told at the places of the JSON answer as well."""
+
+LASTS, SLOWEST, FASTEST = 5.0, 2.0, 25.0
+"""Seconds for which steps, paths and motions play, and states a second, at least and at most."""
+
+REACH = 0.13
+"""How far the largest displacement of a mode is drawn, over the size of the structure."""
+
+DIGITS = 1e-5
+"""Places of symbols are rounded to this share of the size."""
+
+DRAWN = ("moment", "twist", "curvature", "tension", "shear", "stress")
+"""Quantities along members by which a page colours them."""
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """A state that a page shows, what is said of where it is, and what the JSON answer tells of it."""
+
+    text: str
+    step: Configuration
+    told: dict[str, Any]
+    branch: int = 0
+    kind: str = ""
+    stable: bool | str | None = None
+
+
+@dataclass(eq=False)
+class _Numbers:
+    """Packs arrays of numbers in one precision."""
+
+    exact: bool
+    kinds: dict[bool, str] = field(default_factory=lambda: {True: "<f8", False: "<f4"})
+
+    def packed(self, values: Any) -> str:
+        """An array as text."""
+        return base64.b64encode(np.ascontiguousarray(values, self.kinds[self.exact]).tobytes()).decode()
+
+
+def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any]:
+    """All that the viewer needs, as tables, lists, texts and numbers that JSON has.
+
+    Parameters
+    ----------
+    answer : Solution, Path, Trajectory or Modes
+    source : str
+        The text of the scene file.
+    said : str
+        What is said of the answer in short.
+
+    Raises
+    ------
+    SceneError
+        The scene has no member that could be seen.
+    """
+    scene, states = answer.scene, list(_states_of(answer))
+    if not scene.members:
+        raise SceneError("members: found none, accepted: at least one member that a page can show")
+    space = states[-1].step.model.space
+    quantities = {
+        key: QUANTITIES[key]
+        for key in DRAWN
+        if (space or key != "twist") and (key != "stress" or any(outlined(scene, m) for m in scene.members.values()))
+    }
+    places = _places(states, len(quantities))
+    count = sum(map(len, places.values())) * len(states) * (3 + len(quantities))
+    numbers = _Numbers(count <= EXACT_NUMBERS)
+    fields = [{name: state.step.along(name, x) for name, x in places.items()} for state in states]
+    lines = [[found["position"] for found in one.values()] for one in fields]
+    rest = [scene.center_lines[name].positions(x) for name, x in places.items()]
+    shapes = _Shapes(answer, places, lines[0]) if isinstance(answer, Modes) else None
+    everything = np.vstack([*rest, *(line for one in lines for line in one), *(shapes.farthest if shapes else ())])
+    view = view_of(space, [everything])
+    symbols = _Symbols(states, lines, rest, isinstance(answer, Trajectory))
+    times = [state.step.factor for state in states]
+    found: dict[str, Any] = {
+        "title": scene.title,
+        "kind": scene.analysis.type,
+        "status": answer.status.value,
+        "plane": not space,
+        "bits": 64 if numbers.exact else 32,
+        "view": {"right": view.right.tolist(), "up": view.up.tolist()},
+        "rate": float(np.clip(_rate(answer, times), SLOWEST, FASTEST)),
+        "gravity": plain(scene.gravity) if scene.gravity and any(scene.gravity) else None,
+        "members": [{"name": name, "type": scene.members[name].type, "x": x.tolist()} for name, x in places.items()],
+        "quantities": [
+            {"key": key, "label": one.label(space), "unit": one.unit, "signed": one.diverging(space)}
+            for key, one in quantities.items()
+        ],
+        "rest": numbers.packed(np.vstack(rest)),
+        "states": [],
+        "modes": [] if shapes is None else shapes.packed(numbers),
+        "symbols": symbols.known,
+        "report": said,
+        "scene": source,
+    }
+    for number, state in enumerate(states):
+        entry = {
+            "text": state.text,
+            "at": state.step.factor,
+            "branch": state.branch,
+            "kind": state.kind,
+            "stable": state.stable,
+            "lines": numbers.packed(np.vstack(lines[number])),
+            "values": _values(state.step, quantities, fields[number], places, numbers),
+            "told": state.told,
+            **symbols.of(number),
+        }
+        found["states"].append(entry)
+    return found
+
+
+# -- states ------------------------------------------------------------------------------------------------------------
+
+
+def _states_of(answer: Shown) -> Iterator[_State]:
+    """The states of an answer, in the order in which they are played."""
+    if isinstance(answer, Path):
+        yield from _along_path(answer)
+    elif isinstance(answer, Trajectory):
+        yield from _in_time(answer)
+    elif isinstance(answer, Modes):
+        yield _State("equilibrium", answer.last, _without_courses(answer.last.to_dict()))
+    else:
+        steps = answer.steps
+        for number, step in enumerate(steps, 1):
+            same = sum(other.factor == step.factor for other in steps)
+            own = sum(other.factor == step.factor for other in steps[:number])
+            which = f", equilibrium {own} of {same}" if same > 1 else ""
+            stable = step.certificate.stable
+            told = _without_courses(step.to_dict())
+            yield _State(f"factor {in_short(step.factor)}{which}", step, told, stable=stable)
+
+
+def _along_path(path: Path) -> Iterator[_State]:
+    """Points of a path and its branches, and the equilibria that were asked for."""
+    every = [(number, point) for number, branch in enumerate(path.branches) for point in branch.points]
+    thinned = set(np.unique(np.linspace(0, len(every) - 1, min(MOST_STATES, len(every))).round().astype(int)).tolist())
+    entries = {
+        (number, kind): iter(getattr(branch, f"{kind.replace(' ', '_')}s"))
+        for number, branch in enumerate(path.branches)
+        for kind in ("limit point", "bifurcation")
+    }
+    for index, (number, point) in enumerate(every):
+        entry = next(entries.get((number, point.kind), iter(())), None)
+        if index not in thinned and not point.kind:
+            continue
+        where = f"branch {number}, " if number else ""
+        step: Configuration = path.configuration(point)
+        told = _without_courses(entry.to_dict()) if entry is not None else _told(step)
+        text = f"{where}factor {in_short(point.factor)}{', ' if point.kind else ''}{point.kind}"
+        yield _State(text, step, told, number, point.kind, point.stable)
+    for number, branch in enumerate(path.branches):
+        for one in branch.steps:
+            where = f"branch {number}, " if number else ""
+            text = f"{where}factor {in_short(one.factor)}, as asked for"
+            yield _State(text, one, _without_courses(one.to_dict()), number, "step", one.certificate.stable)
+
+
+def _in_time(motion: Trajectory) -> Iterator[_State]:
+    """States of a motion: its answers, and others so that it plays evenly."""
+    own = motion.times
+    answers = own[np.unique(np.linspace(0, len(own) - 1, min(MOST_STATES, len(own))).round().astype(int))]
+    if motion.record is None or len(own) < 2:
+        steps = [step for step in motion.steps if step.factor in set(answers.tolist())]
+    else:
+        times = np.union1d(answers, np.linspace(own[0], own[-1], MOST_STATES + 1 - min(len(answers), MOST_STATES // 2)))
+        steps = list(motion.between(times))
+    factor, letter = prefix(float(own[-1]), 0.1)
+    known = set(own.tolist())
+    for step in steps:
+        told = plain(step.to_dict()) if step.time in known else _told(step)
+        yield _State(
+            f"time {step.time / factor:.4g} {letter}s", step, told, kind="answer" if step.time in known else ""
+        )
+
+
+def _told(step: Configuration) -> dict[str, Any]:
+    """What a page tells of a state that is no entry of the JSON answer, under the same keys."""
+    return {"factor": step.factor, **plain(step.tables("nodes"))}
+
+
+def _without_courses(entry: dict[str, Any]) -> dict[str, Any]:
+    """An entry of the JSON answer without what is told along members, which has its own place on a page."""
+    found = dict(entry)
+    for kind in ("members", "tubes"):
+        if kind in found:
+            found[kind] = {
+                name: {key: value for key, value in table.items() if not isinstance(value, list)}
+                for name, table in found[kind].items()
+            }
+    return plain(found)
+
+
+def _rate(answer: Shown, times: Sequence[float]) -> float:
+    """States a second: a motion in real time where that can be seen, all else for some seconds."""
+    span = times[-1] - times[0] if isinstance(answer, Trajectory) else LASTS
+    return len(times) / (span if 1.0 <= span <= 4.0 * LASTS else LASTS)
+
+
+# -- along members -----------------------------------------------------------------------------------------------------
+
+
+def _places(states: Sequence[_State], quantities: int) -> dict[str, Array]:
+    """Fractions of the length of each member at which it is shown, the same in all states."""
+    scene, looked_at = states[-1].step.model.scene, states[:: max(1, len(states) // 8)]
+    wanted = {}
+    for name, member in scene.members.items():
+        straight = member.type == "rigid" and scene.center_lines[name].turning == 0.0
+        turning = 0.0 if straight else max(_turning(state.step, name) for state in (*looked_at, states[-1]))
+        wanted[name] = 2 if straight else int(np.clip(1 + math.ceil(turning / TURNING), SMOOTH, MOST_PLACES))
+    room = MOST_NUMBERS / (len(states) * (3 + quantities) * max(sum(wanted.values()), 1))
+    found = {}
+    for name, count in wanted.items():
+        few = min(count, max(FEWEST, int(room * count)))
+        x = np.linspace(0.0, 1.0, few)
+        if len(states) <= LISTED and room >= 2.0:
+            x = np.union1d(x, states[-1].step.places(name))
+        found[name] = x
+    return found
+
+
+def _turning(step: Configuration, member: str) -> float:
+    """How far the tangent of a member turns along it, rad."""
+    tangents = tangents_of(step, member, step.model.along(member))
+    turned = np.linalg.norm(np.diff(tangents, axis=0), axis=1)
+    bent = float((2.0 * np.arcsin(np.clip(0.5 * turned, 0.0, 1.0))).sum())
+    return max(bent, step.model.scene.center_lines[member].turning)
+
+
+def _values(
+    step: Configuration,
+    quantities: Mapping[str, ColourQuantity],
+    fields: Mapping[str, Mapping[str, Array]],
+    places: Mapping[str, Array],
+    numbers: _Numbers,
+) -> dict[str, str | None]:
+    """Values along all members, of each quantity; None where all are rounding."""
+    found: dict[str, str | None] = {}
+    for key, quantity in quantities.items():
+        values = quantity.of(step, fields, places)
+        found[key] = numbers.packed(np.concatenate(values)) if values else None
+    return found
+
+
+class _Shapes:
+    """Mode shapes along members, so large that they are well seen."""
+
+    def __init__(self, modes: Modes, places: Mapping[str, Array], base: Sequence[Array]) -> None:
+        self._modes, self._base = modes, base
+        size = float(np.linalg.norm(np.ptp(np.vstack(base), axis=0)))
+        self._shapes = []
+        for number in range(len(modes.modes)):
+            moved = [np.asarray(modes.along(number, name, x)["position"], complex) for name, x in places.items()]
+            largest = max(float(np.abs(line).max(initial=0.0)) for line in moved)
+            # What only twists moves nothing.
+            self._shapes.append([line * (REACH * size / max(largest, TINY)) for line in moved])
+        self.farthest = [
+            line + sign * moved.real
+            for shape in self._shapes
+            for line, moved in zip(base, shape, strict=True)
+            for sign in (1.0, -1.0)
+        ]
+
+    def packed(self, numbers: _Numbers) -> list[dict[str, Any]]:
+        """A table for each mode."""
+        found = []
+        for number, (mode, shape) in enumerate(zip(self._modes.modes, self._shapes, strict=True), 1):
+            damping = f", damping ratio {mode.damping:.3g}" if mode.damping else ""
+            lines = np.vstack(shape)
+            entry = {
+                "text": f"mode {number}: {mode.omega:.6g} rad/s, {mode.omega / (2.0 * math.pi):.6g} Hz{damping}",
+                "real": numbers.packed(lines.real),
+                "imaginary": numbers.packed(lines.imag) if np.any(lines.imag) else None,
+                "told": {"omega": mode.omega, "damping": mode.damping, "mass": float(mode.mass)},
+            }
+            found.append(entry)
+        return found
+
+
+# -- symbols -----------------------------------------------------------------------------------------------------------
+
+
+class _Symbols:
+    """Supports, joints, obstacles, loads and reactions of all states, each symbol once."""
+
+    def __init__(
+        self, states: Sequence[_State], lines: Sequence[Sequence[Array]], rest: Sequence[Array], moving: bool
+    ) -> None:
+        self.known: list[dict[str, Any]] = []
+        self._numbers: dict[Any, int] = {}
+        self._states, self._moving = states, moving
+        scene = states[-1].step.model.scene
+        extent = float(np.ptp(np.vstack([*rest, *(line for one in lines for line in one)]), axis=0).max())
+        self._unit, letter = prefix(extent, 0.2)
+        drawn = [[line / self._unit for line in one] for one in lines]
+        still = [line / self._unit for line in rest]
+        course = Course(self._unit, letter, tuple(scene.members), still, drawn[-1], drawn, [])
+        view = view_of(states[-1].step.model.space, [course.everything])
+        self._sketches = [
+            Sketch(scene, state.step, replace(course, last=own), view) for state, own in zip(states, drawn, strict=True)
+        ]
+        self._first = replace(self._sketches[0], marks=[], labels=[])
+        sketch_supports(self._first)
+        if not moving:
+            # Arrows of all states have one scale.
+            largest = max(sketch.largest_force for sketch in self._sketches)
+            for sketch in self._sketches:
+                sketch.largest_force = largest
+
+    def of(self, number: int) -> dict[str, Any]:
+        """Numbers of the symbols of a state, and its labels."""
+        sketch = self._sketches[number]
+        sketch_supports(sketch)
+        sketch.marks[:] = carried_along(self._first, sketch)
+        if not self._moving:
+            sketch_loads(sketch)
+        size = sketch.size * self._unit
+        labels = [
+            {
+                "at": self._rounded(label.anchor, size),
+                "away": np.asarray(label.away, float).round(3).tolist(),
+                "text": label.text,
+                "colour": label.colour,
+            }
+            for label in sketch.labels
+        ]
+        return {"symbols": [self._number(mark, size) for mark in sketch.marks], "labels": labels}
+
+    def _rounded(self, points: Array, size: float) -> list[float | None]:
+        """Places (n, 3) in drawn units as a list in metres, with None for what is not a number."""
+        grid = DIGITS * size
+        values = np.round(np.asarray(points, float).ravel() * self._unit / grid) * grid
+        return [float(f"{value:.7g}") if math.isfinite(value) else None for value in values.tolist()]
+
+    def _number(self, mark: Any, size: float) -> int:
+        points = self._rounded(mark.points, size)
+        key = (mark.kind, mark.colour, mark.fill, mark.width, mark.dotted, tuple(points))
+        if key not in self._numbers:
+            self._numbers[key] = len(self.known)
+            entry = {
+                "kind": mark.kind,
+                "points": points,
+                "colour": mark.colour,
+                "width": mark.width,
+                "level": mark.level,
+            }
+            entry |= {"fill": mark.fill} if mark.kind in ("area", "dot") else {}
+            entry |= {"dotted": True} if mark.dotted else {}
+            self.known.append(entry)
+        return self._numbers[key]

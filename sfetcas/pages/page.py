@@ -1,0 +1,99 @@
+"""Pages for a browser: an answer, the viewer that draws it and its looks in one file, which asks for nothing else.
+
+What comes from a scene is text in the page and never markup: all of it stands in one table of JSON without ``<``, and
+the viewer puts it where it is seen as text.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+import re
+from pathlib import Path as File
+
+from ..errors import SceneError
+from ..files import write_file
+from .content import Shown, content_of
+
+__all__ = ["View", "check_page", "page_of", "save_page"]
+
+PARTS = File(__file__).parent
+HEIGHT = 560
+"""Of a page in a notebook, pixels."""
+
+ENDINGS = (".html", ".htm")
+
+
+def page_of(answer: Shown, source: str | None = None, said: str | None = None) -> str:
+    """The text of a page that shows an answer.
+
+    Parameters
+    ----------
+    answer : Solution, Path, Trajectory or Modes
+    source : str, optional
+        The text of the scene file; by default the scene as JSON.
+    said : str, optional
+        A report of the answer; by default what Python shows of it.
+
+    Raises
+    ------
+    SceneError
+        The scene has no member that could be seen.
+    """
+    if source is None:
+        source = json.dumps(answer.scene.to_dict(), indent=2, ensure_ascii=False)
+    said = repr(answer) if said is None else said
+    content = json.dumps(content_of(answer, source, said), allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+    parts = {
+        "title": html.escape(answer.scene.title or "sfetcas"),
+        "style": (PARTS / "viewer.css").read_text(encoding="utf-8"),
+        "viewer": (PARTS / "viewer.js").read_text(encoding="utf-8"),
+        # Within a script nothing ends it but "</script", and "<!--" would change how it is read.
+        "content": content.replace("<", "\\u003c"),
+    }
+    template = (PARTS / "page.html").read_text(encoding="utf-8")
+    return re.sub(r"@(title|style|viewer|content)@", lambda found: parts[found[1]], template)
+
+
+def check_page(file: str | os.PathLike[str]) -> None:
+    """Refuse a file that is no page by its ending.
+
+    Raises
+    ------
+    SceneError
+        The ending is another one.
+    """
+    ending = File(file).suffix
+    if ending.lower() not in ENDINGS:
+        raise SceneError(f"{os.fspath(file)}: found the ending {ending!r}, accepted: {', '.join(ENDINGS)}")
+
+
+def save_page(answer: Shown, file: str | os.PathLike[str]) -> None:
+    """Write :func:`page_of` to a file, all of it or nothing.
+
+    Raises
+    ------
+    SceneError
+        As :func:`page_of`; the file has another ending, or cannot be written.
+    """
+    check_page(file)
+    text = page_of(answer)
+    write_file(File(file), lambda path: path.write_text(text, encoding="utf-8"))
+
+
+class View:
+    """A page that notebooks show.
+
+    Parameters
+    ----------
+    answer : Solution, Path, Trajectory or Modes
+    """
+
+    def __init__(self, answer: Shown) -> None:
+        self.page = page_of(answer)
+
+    def _repr_html_(self) -> str:
+        """The page in a frame of its own, which knows nothing of the notebook."""
+        look = f"width: 100%; height: {HEIGHT}px; border: 1px solid #ccc"
+        return f'<iframe sandbox="allow-scripts" style="{look}" srcdoc="{html.escape(self.page)}"></iframe>'
