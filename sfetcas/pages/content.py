@@ -46,8 +46,10 @@ SMOOTH = 25
 LISTED = 20
 """States up to which members are told at the places of the JSON answer as well."""
 
-LASTS, SLOWEST, FASTEST = 5.0, 2.0, 25.0
-"""Seconds for which steps, paths and motions play, and states a second, at least and at most."""
+LASTS, LONGEST, SLOWEST = 5.0, 20.0, 2.0
+"""Seconds for which steps, paths and motions play, those up to which motions go in real time, and states a second at
+least.
+"""
 
 REACH = 0.13
 """How far the largest displacement of a mode is drawn, over the size of the structure."""
@@ -118,7 +120,6 @@ def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any
     everything = np.vstack([*rest, *(line for one in lines for line in one), *(shapes.farthest if shapes else ())])
     view = view_of(space, [everything])
     symbols = _Symbols(states, lines, rest, isinstance(answer, Trajectory))
-    times = [state.step.factor for state in states]
     found: dict[str, Any] = {
         "title": scene.title,
         "kind": scene.analysis.type,
@@ -126,7 +127,7 @@ def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any
         "plane": not space,
         "bits": 64 if numbers.exact else 32,
         "view": {"right": view.right.tolist(), "up": view.up.tolist()},
-        "rate": float(np.clip(_rate(answer, times), SLOWEST, FASTEST)),
+        "seconds": _seconds(answer, states),
         "gravity": plain(scene.gravity) if scene.gravity and any(scene.gravity) else None,
         "members": [{"name": name, "type": scene.members[name].type, "x": x.tolist()} for name, x in places.items()],
         "quantities": [
@@ -210,7 +211,7 @@ def _in_time(motion: Trajectory) -> Iterator[_State]:
     if motion.record is None or len(own) < 2:
         steps = [step for step in motion.steps if step.factor in set(answers.tolist())]
     else:
-        times = np.union1d(answers, np.linspace(own[0], own[-1], MOST_STATES + 1 - min(len(answers), MOST_STATES // 2)))
+        times = np.union1d(answers, np.linspace(own[0], own[-1], max(MOST_STATES - len(answers), 2)))
         steps = list(motion.between(times))
     factor, letter = prefix(float(own[-1]), 0.1)
     known = set(own.tolist())
@@ -238,10 +239,10 @@ def _without_courses(entry: dict[str, Any]) -> dict[str, Any]:
     return plain(found)
 
 
-def _rate(answer: Shown, times: Sequence[float]) -> float:
-    """States a second: a motion in real time where that can be seen, all else for some seconds."""
-    span = times[-1] - times[0] if isinstance(answer, Trajectory) else LASTS
-    return len(times) / (span if 1.0 <= span <= 4.0 * LASTS else LASTS)
+def _seconds(answer: Shown, states: Sequence[_State]) -> float:
+    """How long all states are played: a motion in real time where that can be seen, all else for some seconds."""
+    span = states[-1].step.factor - states[0].step.factor if isinstance(answer, Trajectory) else 0.0
+    return span if 1.0 <= span <= LONGEST else min(LASTS, len(states) / SLOWEST)
 
 
 # -- along members -----------------------------------------------------------------------------------------------------

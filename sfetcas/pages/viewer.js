@@ -680,7 +680,7 @@
     $("play").textContent = "play";
   };
   const play = () => {
-    const mine = (playing = performance.now()), from = state >= last ? 0 : state;
+    const mine = (playing = performance.now()), from = state >= last ? 0 : shareOf(state);
     $("play").textContent = "stop";
     const begin = performance.now();
     const tick = (now) => {
@@ -690,7 +690,7 @@
         phase = 2 * Math.PI * 0.5 * passed;
         draw();
       } else {
-        const number = (from + Math.floor(passed * data.rate)) % (last + 1);
+        const number = at((passed / data.seconds + from) % 1);
         if (number !== state) go(number);
       }
       requestAnimationFrame(tick);
@@ -699,6 +699,13 @@
   };
   // What was asked for beside a path stands after it and is not played.
   const last = states.reduce((found, one, i) => (one.kind === "step" ? found : i), 0);
+  /** Which share of all that is played is over at a state: of a motion of its time. */
+  const shareOf = (number) => (upright ? (states[number].at - states[0].at) / (states[last].at - states[0].at || 1) : number / (last + 1));
+  const at = (share) => {
+    let found = 0;
+    while (found < last && shareOf(found + 1) <= share) found++;
+    return found;
+  };
 
   // -- pointers -------------------------------------------------------------------------------------------------------
 

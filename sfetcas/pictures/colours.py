@@ -103,11 +103,11 @@ def _across(vectors: Array, tangents: Array) -> Array:
 def _bending(step: Configuration, member: str, x: Array, fields: Mapping[str, Array]) -> Array:
     if not step.model.space:
         return fields["moment"][:, 2]
-    return _across(fields["moment"], tangents_of(step, member, x))
+    return _across(fields["moment"], tangents_of(step, member, x, fields))
 
 
 def _twisting(step: Configuration, member: str, x: Array, fields: Mapping[str, Array]) -> Array:
-    return _along(fields["moment"], tangents_of(step, member, x))
+    return _along(fields["moment"], tangents_of(step, member, x, fields))
 
 
 def _curving(step: Configuration, member: str, x: Array, fields: Mapping[str, Array]) -> Array:
@@ -116,11 +116,11 @@ def _curving(step: Configuration, member: str, x: Array, fields: Mapping[str, Ar
 
 
 def _pulling(step: Configuration, member: str, x: Array, fields: Mapping[str, Array]) -> Array:
-    return _along(fields["force"], tangents_of(step, member, x))
+    return _along(fields["force"], tangents_of(step, member, x, fields))
 
 
 def _shearing(step: Configuration, member: str, x: Array, fields: Mapping[str, Array]) -> Array:
-    tangents = tangents_of(step, member, x)
+    tangents = tangents_of(step, member, x, fields)
     if step.model.space:
         return _across(fields["force"], tangents)
     return fields["force"][:, 1] * tangents[:, 0] - fields["force"][:, 0] * tangents[:, 1]

@@ -181,10 +181,13 @@ def _samples(step: Configuration, member: str) -> Array:
     return np.linspace(0.0, 1.0, 1 + min(20_000, max(100, math.ceil(max(turning, line.turning) / 0.05))))
 
 
-def tangents_of(step: Configuration, member: str, x: Array) -> Array:
-    """Unit tangents (n, 3) at fractions (n,) of the length of a deformed member, fixed axes."""
+def tangents_of(step: Configuration, member: str, x: Array, fields: Mapping[str, Array] | None = None) -> Array:
+    """Unit tangents (n, 3) at fractions (n,) of the length of a deformed member, fixed axes.
+
+    ``fields`` are those there, as of :meth:`Configuration.along`, where they are known.
+    """
     rest = step.model.scene.center_lines[member].tangents(x)
-    return quaternion.rotate(step.along(member, x)["quaternion"], rest)
+    return quaternion.rotate((fields or step.along(member, x))["quaternion"], rest)
 
 
 # The point of view

@@ -1,0 +1,188 @@
+"""What pages hold of answers, and how they are written."""
+
+import base64
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.scenes import lattice
+from sfetcas import SceneError, load, solve
+from sfetcas.cli import main
+from sfetcas.pages import content
+from sfetcas.pages.content import content_of
+from sfetcas.pages.page import page_of
+
+PROBLEMS = Path(__file__).parent.parent / "problems"
+
+MOST = 2_000_000
+"""Bytes of a page of a usual scene."""
+
+
+@pytest.fixture(scope="module")
+def bend():
+    return solve(load(PROBLEMS / "bend_45_degrees.toml"))
+
+
+def unpacked(found, text):
+    return np.frombuffer(base64.b64decode(text), {64: "<f8", 32: "<f4"}[found["bits"]])
+
+
+def held(page):
+    """The table that a page holds, as a browser reads it."""
+    (text,) = re.findall(r'<script type="application/json" id="content">(.*?)</script>', page, re.DOTALL)
+    return json.loads(text)
+
+
+def test_places_and_values_are_those_of_the_answer(bend):
+    found = content_of(bend)
+    assert found["bits"] == 64
+    (member,) = found["members"]
+    for state, step in zip(found["states"], bend.steps, strict=True):
+        along = step.along("bend", member["x"])
+        assert np.array_equal(unpacked(found, state["lines"]).reshape(-1, 3), along["position"])
+        # A load at the tip bends and pulls by the same force everywhere.
+        tension, shear = (unpacked(found, state["values"][key]) for key in ("tension", "shear"))
+        assert np.hypot(tension, shear) == pytest.approx(np.full(len(tension), step.factor), rel=1e-12)
+        assert state["told"]["nodes"]["tip"]["position"] == step.position("tip").tolist()
+    # Where the JSON answer lists fields a page has them.
+    assert set(bend.to_dict()["steps"][-1]["members"]["bend"]["s"]) <= set(member["x"])
+
+
+def test_many_members_leave_pages_small():
+    scene = lattice(180)
+    page = page_of(solve(scene.replace({"analysis.steps": [0.5, 0.6, 0.7, 0.8, 0.9, 1.0]})))
+    assert len(page.encode()) < MOST
+    found = held(page)
+    assert found["bits"] == 32
+    assert len(found["members"]) == len(scene.members)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "cantilever_inclined_force_all_equilibria",
+        "column_supported_between",
+        "floor_heavy_cantilever",
+        "flexible_parallelogram_motion",
+        "ropes_crossing",
+        "tendon_helical",
+        "vibration_tip_mass",
+    ],
+)
+def test_pages_of_all_kinds_hold_what_the_answer_tells(name):
+    answer = solve(load(PROBLEMS / f"{name}.toml"))
+    page = page_of(answer)
+    assert len(page.encode()) < MOST
+    found = held(page)
+    assert len(found["states"]) >= len(answer.steps)
+    points = sum(len(member["x"]) for member in found["members"])
+    for state in found["states"]:
+        assert len(unpacked(found, state["lines"])) == 3 * points
+        assert all(0 <= number < len(found["symbols"]) for number in state["symbols"])
+    for mode in found["modes"]:
+        assert len(unpacked(found, mode["real"])) == 3 * points
+    supported = [name for name, node in answer.scene.nodes.items() if node.support != "free"]
+    assert not supported or found["symbols"]
+
+
+def test_states_of_a_path_have_the_certificates_of_its_points():
+    path = solve(load(PROBLEMS / "lee_frame.toml"))
+    found = content_of(path)
+    points = [state for state in found["states"] if state["kind"] == "limit point"]
+    assert [state["told"]["certificate"] for state in points] == [
+        entry.certificate.to_dict() for entry in path.limit_points
+    ]
+    asked = [state for state in found["states"] if state["kind"] == "step"]
+    assert [state["at"] for state in asked] == [entry.factor for entry in path.steps]
+
+
+def test_long_paths_and_motions_keep_what_was_asked_for(monkeypatch):
+    monkeypatch.setattr(content, "MOST_STATES", 12)
+    path = solve(load(PROBLEMS / "lee_frame.toml"))
+    kinds = [state["kind"] for state in content_of(path)["states"]]
+    assert len(kinds) <= 12 + 2 + len(path.steps)
+    assert kinds.count("limit point") == 2
+    motion = solve(load(PROBLEMS / "double_pendulum_rigid.toml"))
+    times = [state["at"] for state in content_of(motion)["states"]]
+    assert len(motion.times) < len(times) <= 12
+    assert set(motion.times.tolist()) <= set(times)
+
+
+# -- written -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_command_writes_a_page_with_report_and_scene(tmp_path, capsys):
+    file, page = PROBLEMS / "bend_45_degrees.toml", tmp_path / "bend.html"
+    assert main(["page", str(file), str(page)]) == 0
+    printed = capsys.readouterr().out
+    found = held(page.read_text(encoding="utf-8"))
+    assert found["scene"] == file.read_text(encoding="utf-8")
+    # But for the time that it took.
+    assert found["report"].splitlines()[:-1] == printed[: printed.index("solved in")].splitlines()
+    assert [one.name for one in tmp_path.iterdir()] == ["bend.html"]
+
+
+TORN = """
+[sections.s]
+EI3 = 1.0
+[nodes.A]
+position = [0, 0]
+support = "clamped"
+[nodes.B]
+position = [1, 0]
+support = "clamped"
+[members.m]
+nodes = ["A", "B"]
+section = "s"
+[motions.pull]
+node = "B"
+displacement = [1, 0]
+"""
+"""A member that does not stretch, drawn to twice its length."""
+
+
+@pytest.mark.parametrize(
+    ("out", "code", "sentence"),
+    [
+        ("page.txt", 2, "found the ending '.txt', accepted: .html, .htm"),
+        (
+            "nowhere/page.html",
+            2,
+            "cannot be written; accepted: a plain file in a folder that exists and can be written",
+        ),
+        ("page.html", 3, "no solution"),
+    ],
+)
+def test_what_fails_leaves_what_was_there(tmp_path, capsys, out, code, sentence):
+    """A wrong place is told before anything is solved."""
+    scene, page = tmp_path / "scene.toml", tmp_path / out
+    scene.write_text(TORN, encoding="utf-8")
+    if page.parent.exists():
+        page.write_text("before", encoding="utf-8")
+    before = sorted(one.name for one in tmp_path.iterdir())
+    assert main(["page", str(scene), str(page)]) == code
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert len(said.splitlines()) == 1, said
+    assert sorted(one.name for one in tmp_path.iterdir()) == before
+    assert not page.exists() or page.read_text(encoding="utf-8") == "before"
+
+
+def test_the_scene_itself_is_no_page(tmp_path, capsys):
+    scene = tmp_path / "scene.html"
+    scene.write_text(TORN, encoding="utf-8")
+    assert main(["page", str(scene), str(scene)]) == 2
+    assert scene.read_text(encoding="utf-8") == TORN
+
+
+def test_pages_from_python(tmp_path, bend):
+    assert bend.page(tmp_path / "bend.html") == tmp_path / "bend.html"
+    assert held((tmp_path / "bend.html").read_text(encoding="utf-8"))["report"] == repr(bend)
+    with pytest.raises(SceneError, match=r"found the ending '\.png', accepted: \.html"):
+        bend.page(tmp_path / "bend.png")
+    frame = bend.view()._repr_html_()
+    assert frame.startswith('<iframe sandbox="allow-scripts"')
+    assert "<script" not in frame
