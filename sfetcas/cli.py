@@ -203,10 +203,20 @@ def _add_page(commands: Commands) -> None:
         _page,
         "Run the analysis of a scene and write a page for a browser, which turns, plays and tells its values",
         "arch.toml arch.html",
-        "arch.toml arch.html --accuracy 1e-8",
+        "arch.toml arch.html --live --argument loads.tip.value",
     )
     _add_file(page)
     page.add_argument("page", type=Path, metavar="OUT.html", help="the page: one file that needs no network")
+    page.add_argument(
+        "--live", action="store_true", help="the page has the solver itself: numbers change on it (statics)"
+    )
+    page.add_argument(
+        "--argument",
+        action="append",
+        metavar="NAME[=LOW:HIGH]",
+        help="number of the scene that changes on a live page; may be given several times (default: the load factor, "
+        "all loads and all motions)",
+    )
     _add_settings(page)
 
 
@@ -453,7 +463,8 @@ def _run(options: argparse.Namespace) -> int:
 def _page(options: argparse.Namespace) -> int:
     begin = time.perf_counter()
     scene, settings = load(options.file), _settings(options)
-    outputs = outputs_of_page(options)
+    spans = dict(_span(text) for text in options.argument) if options.argument else None
+    outputs = outputs_of_page(options, scene, spans)
     solution, checks = _answered(options.file, scene, settings)
     solved = time.perf_counter() - begin
     _give(solution, lambda: report(solution, solved), outputs)

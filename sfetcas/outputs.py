@@ -9,7 +9,7 @@ import json
 import os
 import re
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -94,14 +94,17 @@ def outputs_of(options: argparse.Namespace, scene: Scene) -> list[Output]:
     return found
 
 
-def outputs_of_page(options: argparse.Namespace) -> list[Output]:
-    """The page that is asked for, checked before anything is solved.
+def outputs_of_page(
+    options: argparse.Namespace, scene: Scene, arguments: Mapping[str, tuple[float, float] | None] | None
+) -> list[Output]:
+    """The page that is asked for, checked before anything is solved; ``arguments`` are those of a live one.
 
     Raises
     ------
     SceneError
-        Its ending is no page's, it cannot be written, or is the scene itself.
+        Its ending is no page's, it cannot be written, or is the scene itself; no live page shows the scene.
     """
+    from .pages.live import check_live
     from .pages.page import check_page, page_of
 
     path = options.page
@@ -109,12 +112,17 @@ def outputs_of_page(options: argparse.Namespace) -> list[Output]:
     _check_writable(path)
     if path.exists() and path.samefile(options.file):
         raise SceneError(f"{path}: is the scene itself, accepted: another file")
+    if options.live:
+        _placed("--live", lambda: check_live(scene))
+    elif arguments is not None:
+        raise SceneError("--argument: found without effect, accepted: with --live")
     source = options.file.read_text(encoding="utf-8")
 
     def write(answer: Any, there: Path) -> None:
         with contextlib.redirect_stdout(io.StringIO()) as said:
             report(answer, sum(answer.seconds.values()))
-        there.write_text(page_of(answer, source, said.getvalue()), encoding="utf-8")
+        page = page_of(answer, source, said.getvalue(), live=options.live, arguments=arguments)
+        there.write_text(page, encoding="utf-8")
 
     return [Output("OUT.html", path, write)]
 

@@ -341,6 +341,7 @@ ORDER = [
     "reports",
     "pages",
     "pages.content",
+    "pages.live",
     "pages.page",
     "outputs",
     "cli",

@@ -518,19 +518,27 @@ class Equilibrium(Configuration):
 class Viewed:
     """What all answers have: they can be seen in a browser."""
 
-    def page(self, file: str | os.PathLike[str]) -> File:
+    def page(self, file: str | os.PathLike[str], *, live: bool = False, arguments: Any = None) -> File:
         """Write a page for a browser, ``.html``, that turns, plays and tells its values; its path.
 
         One file, which asks for nothing else: it can be sent, kept and opened without a network.
 
+        Parameters
+        ----------
+        file : path
+        live : bool
+            Whether the page has the solver of the scene: then arguments change on it.  Statics only.
+        arguments : names of numbers of the scene, or a mapping of them to their ranges (low, high)
+            Which: by default the factor, all loads and all motions.
+
         Raises
         ------
         SceneError
-            Another ending, or a place that cannot be written.
+            Another ending, a place that cannot be written, or a scene that no live page shows.
         """
         from ..pages.page import save_page
 
-        save_page(cast("Any", self), file)
+        save_page(cast("Any", self), file, live=live, arguments=arguments)
         return File(file)
 
     def view(self) -> View:

@@ -23,7 +23,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import TINY, Array
 from ..paths.path import Path
 from ..pictures.colours import QUANTITIES, ColourQuantity
-from ..pictures.glyphs import carried_along, sketch_loads, sketch_supports
+from ..pictures.glyphs import STANDING, carried_along, sketch_loads, sketch_supports
 from ..pictures.sketch import Course, Sketch, in_short, prefix, tangents_of, view_of
 
 __all__ = ["Shown", "content_of"]
@@ -129,7 +129,10 @@ def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any
         "view": {"right": view.right.tolist(), "up": view.up.tolist()},
         "seconds": _seconds(answer, states),
         "gravity": plain(scene.gravity) if scene.gravity and any(scene.gravity) else None,
-        "members": [{"name": name, "type": scene.members[name].type, "x": x.tolist()} for name, x in places.items()],
+        "members": [
+            {"name": name, "type": scene.members[name].type, "nodes": list(scene.members[name].nodes), "x": x.tolist()}
+            for name, x in places.items()
+        ],
         "quantities": [
             {"key": key, "label": one.label(space), "unit": one.unit, "signed": one.diverging(space)}
             for key, one in quantities.items()
@@ -382,7 +385,15 @@ class _Symbols:
 
     def _number(self, mark: Any, size: float) -> int:
         points = self._rounded(mark.points, size)
-        key = (mark.kind, mark.colour, mark.fill, mark.width, mark.dotted, tuple(points))
+        key = (
+            mark.kind,
+            mark.name.startswith(STANDING),
+            mark.colour,
+            mark.fill,
+            mark.width,
+            mark.dotted,
+            tuple(points),
+        )
         if key not in self._numbers:
             self._numbers[key] = len(self.known)
             entry = {
@@ -394,5 +405,6 @@ class _Symbols:
             }
             entry |= {"fill": mark.fill} if mark.kind in ("area", "dot") else {}
             entry |= {"dotted": True} if mark.dotted else {}
+            entry |= {"stands": True} if mark.name.startswith(STANDING) else {}
             self.known.append(entry)
         return self._numbers[key]

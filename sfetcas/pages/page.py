@@ -12,9 +12,13 @@ import os
 import re
 from pathlib import Path as File
 
+import numpy as np
+
 from ..errors import SceneError
 from ..files import write_file
+from ..parametric.arguments import Asked
 from .content import Shown, content_of
+from .live import check_live, live_of
 
 __all__ = ["View", "check_page", "page_of", "save_page"]
 
@@ -25,7 +29,9 @@ HEIGHT = 560
 ENDINGS = (".html", ".htm")
 
 
-def page_of(answer: Shown, source: str | None = None, said: str | None = None) -> str:
+def page_of(
+    answer: Shown, source: str | None = None, said: str | None = None, *, live: bool = False, arguments: Asked = None
+) -> str:
     """The text of a page that shows an answer.
 
     Parameters
@@ -35,25 +41,41 @@ def page_of(answer: Shown, source: str | None = None, said: str | None = None) -
         The text of the scene file; by default the scene as JSON.
     said : str, optional
         A report of the answer; by default what Python shows of it.
+    live : bool
+        Whether the page has the solver itself, as WebAssembly.
+    arguments
+        Numbers of the scene that change on a live page, as of :func:`~sfetcas.codegen.folder.export`; by default the
+        factor, all loads and all motions.
 
     Raises
     ------
     SceneError
-        The scene has no member that could be seen.
+        The scene has no member that could be seen, or no live page shows it, see
+        :func:`~sfetcas.pages.live.check_live`.
     """
+    if live:
+        check_live(answer.scene)
+    elif arguments is not None:
+        raise SceneError("found arguments of a page that is not live, accepted: with live", ("arguments",))
     if source is None:
         source = json.dumps(answer.scene.to_dict(), indent=2, ensure_ascii=False)
     said = repr(answer) if said is None else said
-    content = json.dumps(content_of(answer, source, said), allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+    found = content_of(answer, source, said)
+    if live:
+        places = {member["name"]: np.array(member["x"]) for member in found["members"]}
+        found["live"] = live_of(answer.scene, places, arguments)
+    content = json.dumps(found, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
     parts = {
         "title": html.escape(answer.scene.title or "sfetcas"),
         "style": (PARTS / "viewer.css").read_text(encoding="utf-8"),
         "viewer": (PARTS / "viewer.js").read_text(encoding="utf-8"),
+        # The solver of a live page is compiled code.
+        "wasm": " 'wasm-unsafe-eval'" if live else "",
         # Within a script nothing ends it but "</script", and "<!--" would change how it is read.
         "content": content.replace("<", "\\u003c"),
     }
     template = (PARTS / "page.html").read_text(encoding="utf-8")
-    return re.sub(r"@(title|style|viewer|content)@", lambda found: parts[found[1]], template)
+    return re.sub(r"@(title|style|viewer|wasm|content)@", lambda found: parts[found[1]], template)
 
 
 def check_page(file: str | os.PathLike[str]) -> None:
@@ -69,7 +91,7 @@ def check_page(file: str | os.PathLike[str]) -> None:
         raise SceneError(f"{os.fspath(file)}: found the ending {ending!r}, accepted: {', '.join(ENDINGS)}")
 
 
-def save_page(answer: Shown, file: str | os.PathLike[str]) -> None:
+def save_page(answer: Shown, file: str | os.PathLike[str], *, live: bool = False, arguments: Asked = None) -> None:
     """Write :func:`page_of` to a file, all of it or nothing.
 
     Raises
@@ -78,7 +100,7 @@ def save_page(answer: Shown, file: str | os.PathLike[str]) -> None:
         As :func:`page_of`; the file has another ending, or cannot be written.
     """
     check_page(file)
-    text = page_of(answer)
+    text = page_of(answer, live=live, arguments=arguments)
     write_file(File(file), lambda path: path.write_text(text, encoding="utf-8"))
 
 

@@ -25,6 +25,7 @@
   const numbers = (owner, key) => {
     const packed = owner[key];
     if (packed === null || packed === undefined) return null;
+    if (typeof packed !== "string") return packed;
     let known = kept.get(packed);
     if (!known) kept.set(packed, (known = unpack(packed)));
     return known;
@@ -35,7 +36,8 @@
   const linesOf = (number) => numbers(states[number], "lines");
 
   let state = states.length - 1, mode = 0, phase = 0, amplitude = 1, colour = "", picked = null, playing = 0;
-  if (data.kind === "dynamic" || data.kind === "path" || data.modes.length) state = 0;
+  // Loads grow along steps; of all equilibria of one step the first is the usual one.
+  if (data.kind !== "static" || data.modes.length || states.every((one) => one.at === states[0].at)) state = 0;
 
   /** Places of all members as they are drawn now: those of a mode move. */
   const drawn = () => {
@@ -418,10 +420,16 @@
       for (const symbol of [...symbols].sort((a, b) => a.level - b.level)) drawSymbol(symbol.level <= 1.5 ? back : pen, symbol);
     }
     if ($("show-labels").checked && $("show-symbols").checked) {
+      const taken = [];
       for (const label of here.labels) {
         const [x, y] = seen(...label.at), length = Math.hypot(...label.away) || 1;
-        const half = 0.5 * pen.measureText(label.text).width;
-        write(pen, label.text, x + (label.away[0] / length) * (half + 8), y - (label.away[1] / length) * 14, label.colour);
+        const half = 0.5 * pen.measureText(label.text).width, [dx, dy] = label.away.map((one) => one / length);
+        // Beside its symbol, on the side that hides least; where none is free it is left out.
+        const ways = [[dx, dy], [-dx, -dy], [dy, -dx], [-dy, dx]].map(([a, b]) => [x + a * (half + 8), y - 14 * b]);
+        const free = ways.find(([a, b]) => taken.every((other) => Math.abs(a - other[0]) > half + other[2] + 3 || Math.abs(b - other[1]) > 14));
+        if (!free) continue;
+        taken.push([...free, half]);
+        write(pen, label.text, ...free, label.colour);
       }
     }
     if (!data.modes.length) {
@@ -436,16 +444,17 @@
       }
     }
     if (picked) drawPicked(pen);
+    if (live && state === known) live.drawHandles(pen);
     corner(pen);
   };
   const drawPicked = (pen) => {
-    if (states.length > 2 && !data.modes.length) {
+    if (known > 2 && !data.modes.length) {
       pen.setLineDash([1.5, 3]);
       pen.strokeStyle = "#8f3b76";
       pen.lineWidth = 1.4;
       pen.beginPath();
       states.forEach((one, number) => {
-        if (one.kind === "step") return;
+        if (one.kind === "step" || one.kind === "live") return;
         const place = seen(...placeOf(picked, number));
         pen[number && one.branch === states[number - 1].branch ? "lineTo" : "moveTo"](...place);
       });
@@ -568,6 +577,7 @@
     }
     return found.sort((a, b) => b.spread - a.spread);
   };
+  const known = states.length;
   const several = states.length > 2 && !data.modes.length && new Set(states.map((one) => one.at)).size > 2;
   const charted = several ? courses() : [];
   let chart = null;
@@ -579,7 +589,7 @@
     return found;
   };
   const drawChart = (holder, number) => {
-    const course = charted[number], factor = { label: upright ? "time, s" : "load factor", values: states.map((one) => one.at) };
+    const course = charted[number], factor = { label: upright ? "time, s" : "load factor", values: states.slice(0, known).map((one) => one.at) };
     const [x, y] = upright ? [factor, course] : [course, factor];
     const W = 360, H = 240, edge = { left: 52, right: 10, top: 10, bottom: 36 };
     const NS = "http://www.w3.org/2000/svg", svg = document.createElementNS(NS, "svg");
@@ -609,7 +619,7 @@
     }
     add("text", { x: 0.5 * (edge.left + W - edge.right), y: H - 6, "text-anchor": "middle", ...font }, x.label);
     add("text", { x: 11, y: 0.5 * (edge.top + H - edge.bottom), "text-anchor": "middle", transform: `rotate(-90 11 ${0.5 * (edge.top + H - edge.bottom)})`, ...font }, y.label);
-    const along = states.map((_, i) => i).filter((i) => states[i].kind !== "step");
+    const along = x.values.map((_, i) => i).filter((i) => states[i].kind !== "step");
     for (let k = 0; k + 1 < along.length; k++) {
       const [i, j] = [along[k], along[k + 1]];
       if (states[i].branch !== states[j].branch) continue;
@@ -617,7 +627,7 @@
       const line = add("line", { x1: px(x.values[i]), y1: py(y.values[i]), x2: px(x.values[j]), y2: py(y.values[j]), stroke: INKS[states[i].branch % INKS.length], "stroke-width": 1.6, "stroke-linecap": "round" });
       if (unstable) line.setAttribute("stroke-dasharray", "3 3");
     }
-    states.forEach((one, i) => {
+    states.slice(0, known).forEach((one, i) => {
       const at = { stroke: INKS[one.branch % INKS.length], fill: "#fff", "stroke-width": 1.4 };
       const mark = one.kind === "bifurcation" ? add("rect", { x: px(x.values[i]) - 4, y: py(y.values[i]) - 4, width: 8, height: 8, ...at })
         : one.kind === "limit point" ? add("circle", { cx: px(x.values[i]), cy: py(y.values[i]), r: 4.2, ...at })
@@ -626,12 +636,14 @@
     });
     const cursor = add("circle", { r: 5.5, fill: "none", stroke: "#d03030", "stroke-width": 2, class: "cursor" });
     const follow = () => {
+      cursor.setAttribute("visibility", state < known ? "visible" : "hidden");
+      if (state >= known) return;
       cursor.setAttribute("cx", px(x.values[state]));
       cursor.setAttribute("cy", py(y.values[state]));
     };
     const nearest = (event) => {
       const frame = svg.getBoundingClientRect(), cx = ((event.clientX - frame.left) / frame.width) * W, cy = ((event.clientY - frame.top) / frame.height) * H;
-      const off = states.map((_, i) => (upright ? Math.abs(px(x.values[i]) - cx) : Math.hypot(px(x.values[i]) - cx, py(y.values[i]) - cy)));
+      const off = x.values.map((_, i) => (upright ? Math.abs(px(x.values[i]) - cx) : Math.hypot(px(x.values[i]) - cx, py(y.values[i]) - cy)));
       return off.indexOf(Math.min(...off));
     };
     svg.addEventListener("pointerdown", (event) => {
@@ -670,7 +682,7 @@
   };
   const go = (number) => {
     state = Math.min(Math.max(number, 0), states.length - 1);
-    $("state").value = state;
+    $("state").value = Math.min(state, known - 1);
     $("where").textContent = data.modes.length ? "" : states[state].text;
     refresh();
     draw();
@@ -698,7 +710,7 @@
     requestAnimationFrame(tick);
   };
   // What was asked for beside a path stands after it and is not played.
-  const last = states.reduce((found, one, i) => (one.kind === "step" ? found : i), 0);
+  const last = states.reduce((found, one, i) => (one.kind === "step" || one.kind === "live" ? found : i), 0);
   /** Which share of all that is played is over at a state: of a motion of its time. */
   const shareOf = (number) => (upright ? (states[number].at - states[0].at) / (states[last].at - states[0].at || 1) : number / (last + 1));
   const at = (share) => {
@@ -715,20 +727,24 @@
     const frame = over.getBoundingClientRect();
     return [event.clientX - frame.left, event.clientY - frame.top];
   };
+  let held = null;
   over.addEventListener("pointerdown", (event) => {
     over.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, within(event));
     moved = 0;
+    held = live && state === known ? live.handleAt(...within(event)) : null;
   });
   over.addEventListener("pointermove", (event) => {
     const before = pointers.get(event.pointerId);
     if (!before) {
-      over.style.cursor = nearest(...within(event)) ? "pointer" : "grab";
+      const handle = live && state === known && live.handleAt(...within(event));
+      over.style.cursor = handle ? "move" : nearest(...within(event)) ? "pointer" : "grab";
       return;
     }
     const now = within(event), dx = now[0] - before[0], dy = now[1] - before[1];
     moved += Math.hypot(dx, dy);
-    if (pointers.size === 2) {
+    if (held) live.drag(held, dx, dy);
+    else if (pointers.size === 2) {
       const other = [...pointers].find(([key]) => key !== event.pointerId)[1];
       const apart = (a) => Math.hypot(a[0] - other[0], a[1] - other[1]) || 1;
       zoom(apart(now) / apart(before), ...other);
@@ -740,6 +756,7 @@
   });
   const release = (event) => {
     if (pointers.delete(event.pointerId) && moved < 4 && event.type === "pointerup") pick(...within(event));
+    held = null;
   };
   over.addEventListener("pointerup", release);
   over.addEventListener("pointercancel", release);
@@ -777,6 +794,210 @@
   };
   const reset = () => look([...data.view.right], [...data.view.up]);
 
+  // -- the solver itself ----------------------------------------------------------------------------------------------
+
+  const JUMP = 0.05, PARTS = 8, SNAPS = 4, ARROW = 80;
+  const live = data.live ? withSolver(data.live) : null;
+
+  /** The solver in the page: it follows its arguments from one equilibrium to the next. */
+  function withSolver(given) {
+    const bytes = Uint8Array.from(atob(given.module), (letter) => letter.charCodeAt(0));
+    const code = new WebAssembly.Instance(new WebAssembly.Module(bytes), {}).exports;
+    if (code._initialize) code._initialize();
+    const size = (list) => list.reduce((sum, one) => Math.max(sum, one.first + one.size), 0);
+    const results = new Float64Array(code.memory.buffer, code.live_results(), size(given.results));
+    const inputs = new Float64Array(code.memory.buffer, code.live_arguments(), size(given.arguments));
+    const report = new DataView(code.memory.buffer, code.live_report_of(), 32);
+    const defaults = new Float64Array(inputs.length);
+    for (const one of given.arguments) defaults.set([].concat(one.default), one.first);
+    const sentences = {}, fields = [], spent = { count: 0, time: 0 };
+    for (const one of Object.values(given.statuses)) sentences[one.value] = one.meaning;
+    const here = { text: "live", at: 0, branch: 0, kind: "live", stable: null, values: {}, told: {}, symbols: [], labels: [] };
+    here.symbols = states[known - 1].symbols.filter((number) => data.symbols[number].stands);
+    let now = null, lines = Float64Array.from(linesOf(known - 1)), snapped = false;
+    states.push(here);
+
+    const solve = (values, warm) => {
+      inputs.set(values);
+      const begin = performance.now(), status = code.live_solve_now(warm ? 1 : 0);
+      spent.time += performance.now() - begin;
+      spent.count += 1;
+      return status;
+    };
+    const holds = (status) => status === 0 || status === 1;
+    const piece = (name) => {
+      const one = given.results.find((found) => found.name === name);
+      return one ? results.slice(one.first, one.first + one.size) : null;
+    };
+    /** Places of all members in the last solution. */
+    const places = () => {
+      const found = new Float64Array(3 * total);
+      members.forEach((member, m) => {
+        const own = piece(`members.${member.name}.position`);
+        if (own) return found.set(own, 3 * starts[m]);
+        const [a, b] = member.nodes.map((node) => piece(`nodes.${node}.position`));
+        member.x.forEach((x, i) => found.set(a.map((one, axis) => (1 - x) * one + x * b[axis]), 3 * (starts[m] + i)));
+      });
+      return found;
+    };
+    const farthest = (a, b) => a.reduce((most, one, i) => Math.max(most, Math.abs(one - b[i])), 0);
+
+    /** Follow the arguments to new values; what jumps between two near ones has snapped. */
+    const follow = (values) => {
+      const from = now, before = lines;
+      snapped = false;
+      if (from) code.live_keep();
+      let status = solve(values, from !== null);
+      if (from && (!holds(status) || farthest(places(), before) > JUMP * extent)) {
+        // Far: by some steps, of which none is much longer than the others, or the structure snaps.
+        code.live_back();
+        const moves = [];
+        let last = before, good = true;
+        for (let k = 1; k <= PARTS && good; k++) {
+          status = solve(values.map((one, i) => from[i] + (k / PARTS) * (one - from[i])), true);
+          good = holds(status);
+          if (!good) break;
+          const next = places();
+          moves.push(farthest(next, last));
+          last = next;
+        }
+        const middle = [...moves].sort((a, b) => a - b)[moves.length >> 1];
+        snapped = good && Math.max(...moves) > Math.max(JUMP * extent, SNAPS * middle);
+        if (!good) status = solve(values, false);
+      } else if (!from && !holds(status)) status = solve(values, false);
+      if (holds(status)) [now, lines] = [values, places()];
+      else if (from) code.live_back();
+      tell(status, values);
+      return status;
+    };
+
+    const rotated = (q, t) => {
+      const v = q.slice(1), a = cross(v, t).map((one, i) => one + q[0] * t[i]), b = cross(v, a);
+      return t.map((one, i) => one + 2 * b[i]);
+    };
+    /** What members are coloured by, as of the answer. */
+    const sections = () => {
+      const found = Object.fromEntries(quantities.map((one) => [one.key, new Float64Array(total).fill(NaN)]));
+      members.forEach((member, m) => {
+        const [force, moment] = ["force", "moment"].map((key) => piece(`members.${member.name}.${key}`));
+        const rest = given.tangents[member.name], turns = piece(`members.${member.name}.${data.plane ? "angle" : "quaternion"}`);
+        if (!force || !moment || !rest || !turns) return;
+        member.x.forEach((_, i) => {
+          const vector = (list) => [list[3 * i], list[3 * i + 1], list[3 * i + 2]], at = starts[m] + i, t0 = vector(rest);
+          const q = data.plane ? [Math.cos(0.5 * turns[i]), 0, 0, Math.sin(0.5 * turns[i])] : [...turns.slice(4 * i, 4 * i + 4)];
+          const t = rotated(q, t0), f = vector(force), c = vector(moment);
+          const across = (v) => Math.hypot(...v.map((one, k) => one - dot(v, t) * t[k]));
+          const told = {
+            moment: data.plane ? c[2] : across(c), twist: dot(c, t), tension: dot(f, t),
+            shear: data.plane ? f[1] * t[0] - f[0] * t[1] : across(f),
+          };
+          for (const [key, value] of Object.entries(told)) if (found[key]) found[key][at] = value;
+        });
+      });
+      return found;
+    };
+    const tell = (status, values) => {
+      const solved = holds(status), told = { status: sentences[status] };
+      if (solved) {
+        if (snapped) told.snapped = "to an equilibrium that was not near";
+        const negative = report.getInt32(8, true);
+        Object.assign(told, { "ways out": negative < 0 ? "not defined" : negative, residual: report.getFloat64(16, true), "error estimate": report.getFloat64(24, true) });
+        for (const one of given.results) {
+          const [table, record, key] = one.name.split("."), own = [...results.slice(one.first, one.first + one.size)];
+          const value = one.shape.length ? own : own[0];
+          if (table === "members") continue;
+          if (key === undefined) (told[table] ??= {})[record] = value;
+          else ((told[table] ??= {})[record] ??= {})[key] = value;
+        }
+        here.lines = lines;
+        here.values = sections();
+        for (const key of Object.keys(ranges)) delete ranges[key];
+        here.told = told;
+      } else here.told = { ...here.told, ...told };
+      here.stable = solved ? status === 0 : null;
+      for (const { input, number } of fields) input.value = number.value = Number(values[number.dataset.at].toPrecision(9));
+      const said = solved ? (status === 1 ? "unstable" : snapped ? "solved; it snapped" : "solved") : "no solution";
+      here.text = `live: ${said}`;
+      $("live-status").textContent = solved ? `${said[0].toUpperCase()}${said.slice(1)}, residual ${report.getFloat64(16, true).toExponential(1)}, estimated error ${report.getFloat64(24, true).toExponential(1)}` : `No solution: ${sentences[status]}. What is shown is the last one.`;
+      $("live-status").dataset.status = status;
+      $("live-rate").textContent = `${Math.round((1000 * spent.count) / spent.time)} solves a second`;
+    };
+
+    // Arrows of forces and places of nodes that can be dragged.
+    const factor = given.arguments.find((one) => one.name === "factor");
+    const grown = (handle, values) => (!handle.grows ? 1 : factor ? values[factor.first] : given.factor);
+    const vectorOf = (handle, values, by) => {
+      const found = [0, 0, 0];
+      handle.components.forEach((axis, i) => { found[axis] = by * values[handle.first + i]; });
+      return found;
+    };
+    const forces = given.handles.filter((one) => one.kind === "force");
+    const largest = Math.max(0, ...forces.map((one) => Math.hypot(...vectorOf(one, defaults, grown(one, defaults)))));
+    const perUnit = ARROW / (largest || 1);
+    const flat = (v) => [dot(camera.right, v), -dot(camera.up, v)];
+    const tip = (handle) => {
+      const at = seen(...here.told.nodes[handle.node].position);
+      if (handle.kind === "place") return [at, at];
+      const way = flat(vectorOf(handle, now, grown(handle, now))).map((one) => one * perUnit);
+      return [at, [at[0] + way[0], at[1] + way[1]]];
+    };
+    const drawHandles = (pen) => {
+      if (!now) return;
+      for (const handle of given.handles) {
+        const [from, to] = tip(handle);
+        if (handle.kind === "force") arrow(pen, from, [to[0] - from[0], to[1] - from[1]], "#d55e00", "");
+        pen.beginPath();
+        pen.arc(...to, 6, 0, 2 * Math.PI);
+        pen.strokeStyle = handle.kind === "force" ? "#d55e00" : "#8f3b76";
+        pen.lineWidth = 1.5;
+        pen.stroke();
+      }
+    };
+    const handleAt = (x, y) => (now && given.handles.find((one) => Math.hypot(...tip(one)[1].map((c, i) => c - [x, y][i])) < NEAR)) || null;
+    const drag = (handle, dx, dy) => {
+      const by = grown(handle, now) * (handle.kind === "force" ? perUnit : camera.scale), values = [...now];
+      if (!by) return;
+      const world = camera.right.map((one, i) => (one * dx - camera.up[i] * dy) / by);
+      handle.components.forEach((axis, i) => { values[handle.first + i] += world[axis]; });
+      follow(values);
+      go(known);
+    };
+
+    const panel = addPanel("Live");
+    made("p", "", panel).id = "live-status";
+    for (const one of given.arguments) {
+      one.spans.forEach(([low, high], i) => {
+        const row = made("label", `${one.name}${one.size > 1 ? `, ${i}` : ""}, ${one.unit}`, panel), at = one.first + i;
+        row.className = "argument";
+        const input = made("input", undefined, row), number = made("input", undefined, row);
+        Object.assign(input, { type: "range", min: low, max: high, step: (high - low) / 1000 || 1 });
+        Object.assign(number, { type: "number", step: "any" });
+        input.dataset.at = number.dataset.at = at;
+        input.id = `argument-${at}`;
+        number.id = `number-${at}`;
+        for (const field of [input, number]) {
+          field.addEventListener(field === input ? "input" : "change", () => {
+            const values = [...(now || defaults)];
+            values[at] = Number(field.value);
+            stop();
+            follow(values);
+            go(known);
+          });
+        }
+        fields.push({ input, number });
+      });
+    }
+    const back = made("button", "as in the scene", panel);
+    back.addEventListener("click", () => {
+      now = null;
+      follow([...defaults]);
+      go(known);
+    });
+    made("p", "Drag a slider, the tip of a force, or a node that a motion moves: each move is solved from the equilibrium before it.", panel);
+    made("p", "", panel).id = "live-rate";
+    return { begin: () => follow([...defaults]), follow, drawHandles, handleAt, drag, results, tip, handles: given.handles };
+  }
+
   // -- begin ----------------------------------------------------------------------------------------------------------
 
   $("title").textContent = data.title || "untitled scene";
@@ -806,15 +1027,17 @@
     const marks = data.kind === "path" ? "Solid: stable, dashed: unstable; circles: limit points, squares: bifurcations. " : "";
     made("p", `${marks}Click or drag: the structure follows.`, panel);
   }
+  if (live) live.begin();
   addPanel("Values", showValues);
   addPanel("Answer", showAnswer);
   made("pre", data.report, addPanel("Report"));
   made("pre", data.scene, addPanel("Scene"));
-  open(charted.length ? "Chart" : "Report");
+  open(live ? "Live" : charted.length ? "Chart" : "Report");
+  if (live) state = known;
 
-  $("state").max = states.length - 1;
+  $("state").max = known - 1;
   $("state").hidden = data.modes.length > 0;
-  $("player").hidden = states.length < 2 && !data.modes.length;
+  $("player").hidden = known < 2 && !live && !data.modes.length;
   $("state").addEventListener("input", () => {
     stop();
     go(Number($("state").value));
@@ -849,5 +1072,12 @@
     state: () => state,
     picked: () => picked,
     webgl: Boolean(gl),
+    /** Of a live page: solve with these arguments; the status and all results. */
+    solve: (values) => {
+      const status = live.follow(values);
+      go(known);
+      return { status, results: [...live.results] };
+    },
+    handles: () => (live ? live.handles.map((one) => ({ ...one, tip: live.tip(one)[1] })) : []),
   });
 })();

@@ -45,7 +45,7 @@ from .sketch import (
     tangents_of,
 )
 
-__all__ = ["carried_along", "sketch_all", "sketch_loads", "sketch_supports"]
+__all__ = ["STANDING", "carried_along", "sketch_all", "sketch_loads", "sketch_supports"]
 
 ARROW = 0.12
 """Length of the longest arrow over the size of the picture; sizes below are shares of it, too."""
