@@ -442,16 +442,21 @@ def _settings(options: argparse.Namespace) -> Settings:
 
 
 def _run(options: argparse.Namespace) -> int:
-    begin = time.perf_counter()
-    scene, settings = load(options.file), _settings(options)
-    outputs = outputs_of(options, scene)
+    begin, scene = time.perf_counter(), load(options.file)
+    return _reported(options, begin, scene, outputs_of(options, scene))
+
+
+def _reported(options: argparse.Namespace, begin: float, scene: Scene, outputs: Sequence[Output]) -> int:
+    """Solve a scene that has been read since ``begin``, report the answer and write its files, also of what a run that
+    fails has reached.
+    """
 
     def show(solution: Answer) -> None:
         solved = time.perf_counter() - begin
         _give(solution, lambda: report(solution, solved), outputs)
 
     try:
-        solution, checks = _answered(options.file, scene, settings)
+        solution, checks = _answered(options.file, scene, _settings(options))
     except SolveError as error:
         if isinstance(error.reached, (Solution, Trajectory)):
             show(error.reached)
@@ -461,14 +466,9 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _page(options: argparse.Namespace) -> int:
-    begin = time.perf_counter()
-    scene, settings = load(options.file), _settings(options)
+    begin, scene = time.perf_counter(), load(options.file)
     spans = dict(_span(text) for text in options.argument) if options.argument else None
-    outputs = outputs_of_page(options, scene, spans)
-    solution, checks = _answered(options.file, scene, settings)
-    solved = time.perf_counter() - begin
-    _give(solution, lambda: report(solution, solved), outputs)
-    return _verdict(solution, checks)
+    return _reported(options, begin, scene, outputs_of_page(options, scene, spans))
 
 
 def _give(answer: object, show: Callable[[], object], outputs: Sequence[Output]) -> None:

@@ -82,8 +82,10 @@ class Opened:
               [copy.width, copy.height] = [drawn.width, drawn.height];
               const pen = copy.getContext("2d");
               pen.drawImage(drawn, 0, 0);
-              return pen.getImageData(0, 0, copy.width, copy.height).data.filter((_, i) => i % 4 === 3).reduce(
-                (sum, alpha) => sum + (alpha > 0), 0);
+              let count = 0;
+              for (const pixel of new Uint32Array(pen.getImageData(0, 0, copy.width, copy.height).data.buffer))
+                count += pixel >>> 24 > 0;
+              return count;
             }"""
         )
 

@@ -20,25 +20,31 @@ from ..dynamics.modes import Modes
 from ..dynamics.motion import Trajectory
 from ..equilibria.solution import Configuration, Solution
 from ..errors import SceneError
-from ..mathematics.arrays import TINY, Array
+from ..mathematics.arrays import Array
 from ..paths.path import Path
 from ..pictures.colours import QUANTITIES, ColourQuantity
 from ..pictures.glyphs import STANDING, carried_along, sketch_loads, sketch_supports
-from ..pictures.sketch import Course, Sketch, in_short, prefix, tangents_of, view_of
+from ..pictures.sketch import REACH, TWISTING, Course, Sketch, in_short, prefix, tangents_of, view_of
 
 __all__ = ["Shown", "content_of"]
 
 Shown: TypeAlias = Solution | Path | Trajectory | Modes
 """An answer that a page shows."""
 
-MOST_STATES = 200
-"""States of a path or a motion on a page; with more, some are passed over."""
+MOST_STATES, FEWEST_STATES = 200, 24
+"""States of a path or a motion on a page, and of large scenes; with more, some are passed over."""
+
+TOLD_LENGTH = 50
+"""What is told of a node takes as much room as so many numbers along members."""
 
 MOST_NUMBERS, EXACT_NUMBERS = 200_000, 40_000
 """Numbers along members on a page, about 1 MB, and how many of them have double precision."""
 
 TURNING, FEWEST, MOST_PLACES = 0.06, 9, 401
 """Turning, rad, between two places of a curved member, and places along a member, at least and at most."""
+
+LOOKED_AT = 4
+"""States at which it is looked how far members turn."""
 
 SMOOTH = 25
 """Places along a member whose values change, where there is room."""
@@ -50,9 +56,6 @@ LASTS, LONGEST, SLOWEST = 5.0, 20.0, 2.0
 """Seconds for which steps, paths and motions play, those up to which motions go in real time, and states a second at
 least.
 """
-
-REACH = 0.13
-"""How far the largest displacement of a mode is drawn, over the size of the structure."""
 
 DIGITS = 1e-5
 """Places of symbols are rounded to this share of the size."""
@@ -101,7 +104,8 @@ def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any
     SceneError
         The scene has no member that could be seen.
     """
-    scene, states = answer.scene, list(_states_of(answer))
+    scene = answer.scene
+    states = list(_states_of(answer, _most_states(answer)))
     if not scene.members:
         raise SceneError("members: found none, accepted: at least one member that a page can show")
     space = states[-1].step.model.space
@@ -125,6 +129,7 @@ def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any
         "kind": scene.analysis.type,
         "status": answer.status.value,
         "plane": not space,
+        "all": scene.analysis.equilibria == "all",
         "bits": 64 if numbers.exact else 32,
         "view": {"right": view.right.tolist(), "up": view.up.tolist()},
         "seconds": _seconds(answer, states),
@@ -163,12 +168,19 @@ def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any
 # -- states ------------------------------------------------------------------------------------------------------------
 
 
-def _states_of(answer: Shown) -> Iterator[_State]:
+def _most_states(answer: Shown) -> int:
+    """How many states of a path or a motion there is room for."""
+    scene = answer.scene
+    each = len(scene.members) * FEWEST * (3 + len(DRAWN)) + len(answer.last.model.nodes) * TOLD_LENGTH
+    return int(np.clip(MOST_NUMBERS // max(each, 1), min(FEWEST_STATES, MOST_STATES), MOST_STATES))
+
+
+def _states_of(answer: Shown, most: int) -> Iterator[_State]:
     """The states of an answer, in the order in which they are played."""
     if isinstance(answer, Path):
-        yield from _along_path(answer)
+        yield from _along_path(answer, most)
     elif isinstance(answer, Trajectory):
-        yield from _in_time(answer)
+        yield from _in_time(answer, most)
     elif isinstance(answer, Modes):
         yield _State("equilibrium", answer.last, _without_courses(answer.last.to_dict()))
     else:
@@ -182,10 +194,10 @@ def _states_of(answer: Shown) -> Iterator[_State]:
             yield _State(f"factor {in_short(step.factor)}{which}", step, told, stable=stable)
 
 
-def _along_path(path: Path) -> Iterator[_State]:
+def _along_path(path: Path, most: int) -> Iterator[_State]:
     """Points of a path and its branches, and the equilibria that were asked for."""
     every = [(number, point) for number, branch in enumerate(path.branches) for point in branch.points]
-    thinned = set(np.unique(np.linspace(0, len(every) - 1, min(MOST_STATES, len(every))).round().astype(int)).tolist())
+    thinned = set(np.unique(np.linspace(0, len(every) - 1, min(most, len(every))).round().astype(int)).tolist())
     entries = {
         (number, kind): iter(getattr(branch, f"{kind.replace(' ', '_')}s"))
         for number, branch in enumerate(path.branches)
@@ -197,24 +209,25 @@ def _along_path(path: Path) -> Iterator[_State]:
             continue
         where = f"branch {number}, " if number else ""
         step: Configuration = path.configuration(point)
-        told = _without_courses(entry.to_dict()) if entry is not None else _told(step)
+        told = _without_courses(entry.to_dict()) if entry is not None else _told(step, "reactions")
         text = f"{where}factor {in_short(point.factor)}{', ' if point.kind else ''}{point.kind}"
         yield _State(text, step, told, number, point.kind, point.stable)
     for number, branch in enumerate(path.branches):
-        for one in branch.steps:
-            where = f"branch {number}, " if number else ""
-            text = f"{where}factor {in_short(one.factor)}, as asked for"
-            yield _State(text, one, _without_courses(one.to_dict()), number, "step", one.certificate.stable)
+        where = f"branch {number}, " if number else ""
+        for kind, entries_of in (("flutter point", branch.flutter_points), ("step", branch.steps)):
+            for one in entries_of:
+                text = f"{where}factor {in_short(one.factor)}, {'as asked for' if kind == 'step' else kind}"
+                yield _State(text, one, _without_courses(one.to_dict()), number, kind, one.certificate.stable)
 
 
-def _in_time(motion: Trajectory) -> Iterator[_State]:
+def _in_time(motion: Trajectory, most: int) -> Iterator[_State]:
     """States of a motion: its answers, and others so that it plays evenly."""
     own = motion.times
-    answers = own[np.unique(np.linspace(0, len(own) - 1, min(MOST_STATES, len(own))).round().astype(int))]
+    answers = own[np.unique(np.linspace(0, len(own) - 1, min(most, len(own))).round().astype(int))]
     if motion.record is None or len(own) < 2:
         steps = [step for step in motion.steps if step.factor in set(answers.tolist())]
     else:
-        times = np.union1d(answers, np.linspace(own[0], own[-1], max(MOST_STATES - len(answers), 2)))
+        times = np.union1d(answers, np.linspace(own[0], own[-1], max(most - len(answers), 2)))
         steps = list(motion.between(times))
     factor, letter = prefix(float(own[-1]), 0.1)
     known = set(own.tolist())
@@ -225,9 +238,9 @@ def _in_time(motion: Trajectory) -> Iterator[_State]:
         )
 
 
-def _told(step: Configuration) -> dict[str, Any]:
+def _told(step: Configuration, *more: str) -> dict[str, Any]:
     """What a page tells of a state that is no entry of the JSON answer, under the same keys."""
-    return {"factor": step.factor, **plain(step.tables("nodes"))}
+    return {"factor": step.factor, **plain(step.tables("nodes", *more))}
 
 
 def _without_courses(entry: dict[str, Any]) -> dict[str, Any]:
@@ -253,7 +266,7 @@ def _seconds(answer: Shown, states: Sequence[_State]) -> float:
 
 def _places(states: Sequence[_State], quantities: int) -> dict[str, Array]:
     """Fractions of the length of each member at which it is shown, the same in all states."""
-    scene, looked_at = states[-1].step.model.scene, states[:: max(1, len(states) // 8)]
+    scene, looked_at = states[-1].step.model.scene, states[:: max(1, len(states) // LOOKED_AT)]
     wanted = {}
     for name, member in scene.members.items():
         straight = member.type == "rigid" and scene.center_lines[name].turning == 0.0
@@ -299,12 +312,16 @@ class _Shapes:
     def __init__(self, modes: Modes, places: Mapping[str, Array], base: Sequence[Array]) -> None:
         self._modes, self._base = modes, base
         size = float(np.linalg.norm(np.ptp(np.vstack(base), axis=0)))
-        self._shapes = []
+        self._shapes, self._scales = list[list[Array]](), list[float]()
         for number in range(len(modes.modes)):
-            moved = [np.asarray(modes.along(number, name, x)["position"], complex) for name, x in places.items()]
-            largest = max(float(np.abs(line).max(initial=0.0)) for line in moved)
-            # What only twists moves nothing.
-            self._shapes.append([line * (REACH * size / max(largest, TINY)) for line in moved])
+            found = [modes.along(number, name, x) for name, x in places.items()]
+            moved, turned = (
+                max(float(np.abs(own[key]).max(initial=0.0)) for own in found) for key in ("position", "rotation")
+            )
+            # What only twists moves by rounding.
+            scale = REACH * size / moved if moved > TWISTING * turned * size else 0.0
+            self._scales.append(scale)
+            self._shapes.append([scale * np.asarray(own["position"], complex) for own in found])
         self.farthest = [
             line + sign * moved.real
             for shape in self._shapes
@@ -317,9 +334,12 @@ class _Shapes:
         found = []
         for number, (mode, shape) in enumerate(zip(self._modes.modes, self._shapes, strict=True), 1):
             damping = f", damping ratio {mode.damping:.3g}" if mode.damping else ""
+            scale = self._scales[number - 1]
+            damping += "" if scale else ", only twists"
             lines = np.vstack(shape)
             entry = {
                 "text": f"mode {number}: {mode.omega:.6g} rad/s, {mode.omega / (2.0 * math.pi):.6g} Hz{damping}",
+                "scale": scale,
                 "real": numbers.packed(lines.real),
                 "imaginary": numbers.packed(lines.imag) if np.any(lines.imag) else None,
                 "told": {"omega": mode.omega, "damping": mode.damping, "mass": float(mode.mass)},
@@ -406,5 +426,6 @@ class _Symbols:
             entry |= {"fill": mark.fill} if mark.kind in ("area", "dot") else {}
             entry |= {"dotted": True} if mark.dotted else {}
             entry |= {"stands": True} if mark.name.startswith(STANDING) else {}
+            entry |= {"obstacle": True} if mark.name.startswith("contact-") else {}
             self.known.append(entry)
         return self._numbers[key]

@@ -13,7 +13,10 @@
     sizes: [[0, 190, 200, 212], [0.25, 110, 175, 175], [0.5, 65, 135, 125], [0.75, 120, 95, 40], [1, 150, 40, 20]],
   };
   const PLAIN = [0.122, 0.227, 0.373];
-  const MEMBER = 2.6, NEAR = 12, SMOOTH = 2, UNFELT = 1e-9, MOST_RECORDS = 200, LOST = 1e30;
+  const MEMBER = 2.6, NEAR = 12, SMOOTH = 2, LARGEST = 1.6e7, UNFELT = 1e-9, SMALL = 1e-6, MOST_RECORDS = 200, LOST = 1e30;
+
+  /** States that are no part of a course. */
+  const BESIDE = ["step", "flutter point", "live"];
 
   // -- what the page holds --------------------------------------------------------------------------------------------
 
@@ -36,8 +39,10 @@
   const linesOf = (number) => numbers(states[number], "lines");
 
   let state = states.length - 1, mode = 0, phase = 0, amplitude = 1, colour = "", picked = null, playing = 0;
-  // Loads grow along steps; of all equilibria of one step the first is the usual one.
-  if (data.kind !== "static" || data.modes.length || states.every((one) => one.at === states[0].at)) state = 0;
+  // Loads grow along steps and paths; of all equilibria of a step the first is the usual one.
+  if (data.kind === "dynamic" || data.modes.length) state = 0;
+  else if (data.all) state = states.findIndex((one) => one.at === states[states.length - 1].at);
+  else if (data.kind === "path") state = states.findLastIndex((one) => one.branch === 0 && !BESIDE.includes(one.kind));
 
   /** Places of all members as they are drawn now: those of a mode move. */
   const drawn = () => {
@@ -63,12 +68,18 @@
   };
   widen(numbers(data, "rest"));
   states.forEach((_, number) => widen(linesOf(number)));
-  for (const one of data.modes) {
-    const base = linesOf(0), real = numbers(one, "real");
-    for (const sign of [1, -1]) widen(Float64Array.from(base, (place, i) => place + sign * real[i]));
-  }
   const extent = Math.hypot(...[0, 1, 2].map((axis) => box.high[axis] - box.low[axis]));
   const origin = [0, 1, 2].map((axis) => 0.5 * (box.low[axis] + box.high[axis]));
+  // Some places of all that is seen, but for obstacles, which may be large.
+  const cloud = [];
+  const gather = (line, most) => {
+    const every = Math.max(1, Math.ceil(line.length / 3 / most));
+    for (let i = 0; i + 2 < line.length; i += 3 * every) if (Number.isFinite(line[i]) && line[i] !== null) cloud.push(line[i], line[i + 1], line[i + 2]);
+  };
+  gather(numbers(data, "rest"), 2000);
+  states.forEach((_, number) => gather(linesOf(number), Math.max(20, 20000 / states.length)));
+  for (const one of data.modes) for (const sign of [1, -1]) gather(Float64Array.from(linesOf(0), (place, i) => place + sign * numbers(one, "real")[i]), 200);
+  for (const symbol of data.symbols) if (!symbol.obstacle) gather(symbol.points, 40);
   const camera = { centre: [...origin], right: [...data.view.right], up: [...data.view.up], scale: 1 };
   const size = { width: 1, height: 1, ratio: 1 };
 
@@ -78,18 +89,16 @@
     return [0.5 * size.width + camera.scale * dot(camera.right, d), 0.5 * size.height - camera.scale * dot(camera.up, d)];
   };
   const fit = () => {
-    let width = 0, height = 0;
     camera.centre = [...origin];
-    for (let corner = 0; corner < 8; corner++) {
-      const d = [0, 1, 2].map((axis) => (corner >> axis & 1 ? 0.5 : -0.5) * (box.high[axis] - box.low[axis]));
-      width = Math.max(width, 2 * Math.abs(dot(camera.right, d)));
-      height = Math.max(height, 2 * Math.abs(dot(camera.up, d)));
+    let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
+    for (let i = 0; i < cloud.length; i += 3) {
+      const d = [0, 1, 2].map((axis) => cloud[i + axis] - origin[axis]), x = dot(camera.right, d), y = dot(camera.up, d);
+      [left, right, low, high] = [Math.min(left, x), Math.max(right, x), Math.min(low, y), Math.max(high, y)];
     }
-    const one = Math.max(width, height) || 1;
-    // Around the members there is room for symbols.
-    const room = data.symbols.length ? 0.18 * Math.hypot(width, height) : 0;
-    [width, height] = [width + room, height + room];
-    const free = [size.width - 60, size.height - 100].map((x) => Math.max(x, 40));
+    camera.centre = camera.centre.map((one, i) => one + 0.5 * ((left + right) * camera.right[i] + (low + high) * camera.up[i]));
+    const [width, height] = [right - left, high - low], one = Math.max(width, height) || 1;
+    // Around it there is room for numbers, tools and the legend.
+    const free = [size.width - 110, size.height - 130].map((x) => Math.max(x, 40));
     camera.scale = Math.min(free[0] / Math.max(width, 1e-3 * one), free[1] / Math.max(height, 1e-3 * one));
   };
   const look = (right, up) => {
@@ -239,7 +248,8 @@
       trace(pen, lines, "#1f3a5f", 2 * MEMBER);
       return;
     }
-    gl.viewport(0, 0, paper.width, paper.height);
+    // Of large canvases browsers draw smaller ones.
+    gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.uniform3fv(painter.right, camera.right);
@@ -277,7 +287,7 @@
 
   // -- colours --------------------------------------------------------------------------------------------------------
 
-  const ranges = {};
+  const ranges = {}, nothing = {};
   /** Least and largest value of a quantity in all states; alike on both sides of zero where it has a sign. */
   const range = (key) => {
     if (!key) return [0, 1];
@@ -288,6 +298,7 @@
         for (const value of values) if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
       }
       if (!(low <= high)) [low, high] = [0, 0];
+      nothing[key] = low === 0 && high === 0;
       const most = Math.max(Math.abs(low), Math.abs(high)) || 1;
       if (quantities.find((one) => one.key === key).signed) [low, high] = [-most, most];
       ranges[key] = high > low ? [low, high] : [low - 0.5 * most, high + 0.5 * most];
@@ -309,9 +320,9 @@
       $("bar").getContext("2d").putImageData(new ImageData(pixels, 256, 1), 0, 0);
       if (gl) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pixels.buffer));
       const [low, high] = range(key);
-      $("low").textContent = short(Math.abs(low) < UNFELT * high ? 0 : low);
-      $("named").textContent = `${one.label}, ${one.unit}`;
-      $("high").textContent = short(high);
+      $("low").textContent = nothing[key] ? "" : short(Math.abs(low) < SMALL * high ? 0 : low);
+      $("named").textContent = nothing[key] ? `${one.label}: 0 everywhere` : `${one.label}, ${one.unit}`;
+      $("high").textContent = nothing[key] ? "" : short(high);
     }
     draw();
   };
@@ -390,11 +401,13 @@
     if (text) write(pen, text, to[0] + (length ? 9 * vector[0] / length : 0), to[1] + (length ? 9 * vector[1] / length : -9), ink);
   };
   const corner = (pen) => {
-    const at = [34, size.height - 46], flat = (v) => [dot(camera.right, v), -dot(camera.up, v)];
+    const at = [46, size.height - 62], flat = (v) => [dot(camera.right, v), -dot(camera.up, v)];
     const axes = [["x", [1, 0, 0], "#b03a2e"], ["y", [0, 1, 0], "#1e8449"], ["z", [0, 0, 1], "#2456a4"]];
     for (const [name, axis, ink] of axes.slice(0, data.plane ? 2 : 3)) arrow(pen, at, flat(axis).map((x) => 24 * x), ink, name);
-    if (data.gravity) {
-      const length = Math.hypot(...data.gravity), way = flat(data.gravity).map((x) => 24 * x / length);
+    // Gravity grows with all loads, but in a motion, where it acts from the beginning.
+    const by = upright ? 1 : states[state].at;
+    if (data.gravity && by) {
+      const length = Math.abs(by) * Math.hypot(...data.gravity), way = flat(data.gravity).map((x) => (24 * x * by) / length);
       arrow(pen, [at[0] + 62, at[1] - 8], way, "#d55e00", "");
       write(pen, `gravity ${short(length)} m/s²`, at[0] + 76, at[1] - 8, "#d55e00", "left");
     }
@@ -435,7 +448,7 @@
     if (!data.modes.length) {
       const names = Object.keys(nodesNow());
       pen.fillStyle = "#1f3a5f";
-      if (names.length <= MOST_RECORDS) {
+      if (names.length <= 10 * MOST_RECORDS) {
         for (const name of names) {
           pen.beginPath();
           pen.arc(...seen(...nodesNow()[name].position), 2.6, 0, 2 * Math.PI);
@@ -454,7 +467,7 @@
       pen.lineWidth = 1.4;
       pen.beginPath();
       states.forEach((one, number) => {
-        if (one.kind === "step" || one.kind === "live") return;
+        if (BESIDE.includes(one.kind)) return;
         const place = seen(...placeOf(picked, number));
         pen[number && one.branch === states[number - 1].branch ? "lineTo" : "moveTo"](...place);
       });
@@ -489,7 +502,8 @@
     [size.width, size.height, size.ratio] = [Math.max(frame.width, 1), Math.max(frame.height, 1), window.devicePixelRatio || 1];
     for (const canvas of [paper, over, under]) {
       // Members are drawn finer than they are seen, which makes their edges smooth.
-      const ratio = size.ratio * (canvas === paper ? SMOOTH : 1);
+      const large = size.width * size.height * (SMOOTH * size.ratio) ** 2 > LARGEST;
+      const ratio = size.ratio * (canvas === paper && !large ? SMOOTH : 1);
       [canvas.width, canvas.height] = [Math.round(size.width * ratio), Math.round(size.height * ratio)];
     }
     if (first) fit();
@@ -516,7 +530,7 @@
     if (caption) made("caption", caption, table);
     for (const [key, value] of Object.entries(record)) {
       const row = made("tr", undefined, table);
-      made("th", UNITS[key] && value !== null ? `${key.replaceAll("_", " ")}, ${UNITS[key]}` : key.replaceAll("_", " "), row);
+      made("th", Object.hasOwn(UNITS, key) && value !== null ? `${key.replaceAll("_", " ")}, ${UNITS[key]}` : key.replaceAll("_", " "), row);
       made("td", words(value), row).dataset.key = key;
     }
     return table;
@@ -530,13 +544,22 @@
     if (picked.node !== undefined) {
       const { nodes, reactions } = states[state].told;
       tableOf(`node ${picked.node}`, nodes[picked.node], panel);
-      if (reactions && reactions[picked.node]) tableOf("reaction of its support", reactions[picked.node], panel);
+      if (reactions && Object.hasOwn(reactions, picked.node)) tableOf("reaction of its support", reactions[picked.node], panel);
       return;
     }
     const { name, x } = members[picked.member], i = starts[picked.member] + picked.sample;
     const say = (value) => (data.bits === 64 ? value : Number(value.toPrecision(7)));
-    tableOf(`member ${name}`, { "fraction of its length": x[picked.sample], position: placeOf(picked, state).map(say) }, panel);
-    if (data.modes.length) return;
+    const rest = data.modes.length ? linesOf(0).slice(3 * i, 3 * i + 3) : placeOf(picked, state);
+    tableOf(`member ${name}`, { "fraction of its length": x[picked.sample], position: [...rest].map(say) }, panel);
+    if (data.modes.length) {
+      const shape = data.modes[mode], told = {};
+      for (const part of ["real", "imaginary"]) {
+        const moved = numbers(shape, part);
+        if (moved && shape.scale) told[part === "real" ? "displacement" : "imaginary part"] = [...moved.slice(3 * i, 3 * i + 3)].map((one) => say(one / shape.scale));
+      }
+      tableOf("of the mode, whose largest is 1", told, panel);
+      return;
+    }
     const found = {};
     for (const one of quantities) {
       const values = numbers(states[state].values, one.key);
@@ -565,7 +588,7 @@
   const upright = data.kind === "dynamic";
   const courses = () => {
     const found = [];
-    const names = Object.keys(states[0].told.nodes || {}).slice(0, MOST_RECORDS);
+    const names = Object.keys(states[0].told.nodes || {});
     for (const name of names) {
       for (let axis = 0; axis < (data.plane ? 2 : 3); axis++) {
         const values = states.map((one) => one.told.nodes[name].position[axis]);
@@ -573,19 +596,21 @@
         if (spread > UNFELT * extent) found.push({ label: `${"xyz"[axis]} of ${name}, m`, values, spread });
       }
       const angles = states.map((one) => one.told.nodes[name].angle);
-      if (angles.every((value) => typeof value === "number") && new Set(angles).size > 1) found.push({ label: `angle of ${name}, rad`, values: angles, spread: 0 });
+      if (angles.every((value) => typeof value === "number") && Math.max(...angles) - Math.min(...angles) > UNFELT) found.push({ label: `angle of ${name}, rad`, values: angles, spread: 0 });
     }
-    return found.sort((a, b) => b.spread - a.spread);
+    return found.sort((a, b) => b.spread - a.spread).slice(0, MOST_RECORDS);
   };
   const known = states.length;
   const several = states.length > 2 && !data.modes.length && new Set(states.map((one) => one.at)).size > 2;
   const charted = several ? courses() : [];
+  // Where nothing moves along a path there is still where it meets what.
+  if (several && !charted.length && data.kind === "path") charted.push({ label: "number of the point", values: states.map((_, i) => i + 1), spread: 0 });
   let chart = null;
 
   const ticks = (low, high) => {
     const rough = (high - low) / 5, power = 10 ** Math.floor(Math.log10(rough));
     const step = power * [1, 2, 5, 10].find((one) => one * power >= rough), found = [];
-    for (let x = Math.ceil(low / step) * step; x <= high + 1e-9 * step; x += step) found.push(Number(x.toPrecision(12)));
+    for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step; k++) found.push(Number((k * step).toPrecision(12)));
     return found;
   };
   const drawChart = (holder, number) => {
@@ -619,7 +644,8 @@
     }
     add("text", { x: 0.5 * (edge.left + W - edge.right), y: H - 6, "text-anchor": "middle", ...font }, x.label);
     add("text", { x: 11, y: 0.5 * (edge.top + H - edge.bottom), "text-anchor": "middle", transform: `rotate(-90 11 ${0.5 * (edge.top + H - edge.bottom)})`, ...font }, y.label);
-    const along = x.values.map((_, i) => i).filter((i) => states[i].kind !== "step");
+    // Between load steps nothing is known.
+    const along = x.values.map((_, i) => i).filter((i) => data.kind !== "static" && !BESIDE.includes(states[i].kind));
     for (let k = 0; k + 1 < along.length; k++) {
       const [i, j] = [along[k], along[k + 1]];
       if (states[i].branch !== states[j].branch) continue;
@@ -631,6 +657,7 @@
       const at = { stroke: INKS[one.branch % INKS.length], fill: "#fff", "stroke-width": 1.4 };
       const mark = one.kind === "bifurcation" ? add("rect", { x: px(x.values[i]) - 4, y: py(y.values[i]) - 4, width: 8, height: 8, ...at })
         : one.kind === "limit point" ? add("circle", { cx: px(x.values[i]), cy: py(y.values[i]), r: 4.2, ...at })
+          : one.kind === "flutter point" ? add("path", { d: `M${px(x.values[i])},${py(y.values[i]) - 5}l5,9h-10z`, ...at })
           : one.kind === "step" || data.kind === "static" ? add("circle", { cx: px(x.values[i]), cy: py(y.values[i]), r: 2.2, ...at }) : null;
       if (mark) mark.append(Object.assign(document.createElementNS(NS, "title"), { textContent: one.text }));
     });
@@ -683,7 +710,7 @@
   const go = (number) => {
     state = Math.min(Math.max(number, 0), states.length - 1);
     $("state").value = Math.min(state, known - 1);
-    $("where").textContent = data.modes.length ? "" : states[state].text;
+    $("where").textContent = data.modes.length ? "" : `${states[state].text}${states[state].stable === false && states[state].kind !== "live" ? ", unstable" : ""}`;
     refresh();
     draw();
   };
@@ -710,7 +737,7 @@
     requestAnimationFrame(tick);
   };
   // What was asked for beside a path stands after it and is not played.
-  const last = states.reduce((found, one, i) => (one.kind === "step" || one.kind === "live" ? found : i), 0);
+  const last = states.reduce((found, one, i) => (BESIDE.includes(one.kind) ? found : i), 0);
   /** Which share of all that is played is over at a state: of a motion of its time. */
   const shareOf = (number) => (upright ? (states[number].at - states[0].at) / (states[last].at - states[0].at || 1) : number / (last + 1));
   const at = (share) => {
@@ -988,24 +1015,27 @@
       });
     }
     const back = made("button", "as in the scene", panel);
+    const forget = () => { now = null; };
     back.addEventListener("click", () => {
-      now = null;
+      forget();
       follow([...defaults]);
       go(known);
     });
     made("p", "Drag a slider, the tip of a force, or a node that a motion moves: each move is solved from the equilibrium before it.", panel);
     made("p", "", panel).id = "live-rate";
-    return { begin: () => follow([...defaults]), follow, drawHandles, handleAt, drag, results, tip, handles: given.handles };
+    return { begin: () => follow([...defaults]), forget, follow, drawHandles, handleAt, drag, results, tip, handles: given.handles };
   }
 
   // -- begin ----------------------------------------------------------------------------------------------------------
 
+  if (data.modes.length) $("show-rest").nextSibling.textContent = " equilibrium";
   $("title").textContent = data.title || "untitled scene";
   $("status").textContent = data.status;
   $("hint").textContent = data.plane ? "drag: move, Shift and drag: turn, wheel: zoom" : "drag: turn, Shift and drag: move, wheel: zoom";
   const option = (select, value, text) => (made("option", text, select).value = value);
   option($("colour"), "", "none");
   for (const one of data.modes.length ? [] : quantities) option($("colour"), one.key, one.label);
+  $("colour").parentElement.hidden = !gl || data.modes.length > 0;
   $("colour").addEventListener("change", () => setColour($("colour").value));
   for (const [name, right, up] of [["x-y", [1, 0, 0], [0, 1, 0]], ["x-z", [1, 0, 0], [0, 0, 1]], ["y-z", [0, 1, 0], [0, 0, 1]]].slice(0, data.plane ? 0 : 3)) {
     const button = made("button", name, $("turns"));
@@ -1024,7 +1054,7 @@
     charted.forEach((one, i) => option(choice, i, one.label));
     choice.addEventListener("change", () => drawChart(holder, Number(choice.value)));
     drawChart(holder, 0);
-    const marks = data.kind === "path" ? "Solid: stable, dashed: unstable; circles: limit points, squares: bifurcations. " : "";
+    const marks = data.kind === "path" ? "Solid: stable, dashed: unstable; circles: limit points, squares: bifurcations, triangles: flutter points, dots: factors asked for. " : "";
     made("p", `${marks}Click or drag: the structure follows.`, panel);
   }
   if (live) live.begin();
@@ -1037,7 +1067,7 @@
 
   $("state").max = known - 1;
   $("state").hidden = data.modes.length > 0;
-  $("player").hidden = known < 2 && !live && !data.modes.length;
+  document.querySelector("footer").hidden = known < 2 && !live && !data.modes.length;
   $("state").addEventListener("input", () => {
     stop();
     go(Number($("state").value));
@@ -1058,7 +1088,9 @@
   }
   new ResizeObserver(resize).observe($("stage"));
   resize();
-  setColour(data.modes.length || data.kind === "path" ? "" : quantities[0].key);
+  // What is zero everywhere needs no colours.
+  const first = quantities.find((one) => range(one.key) && !nothing[one.key]);
+  setColour(gl && first && !data.modes.length ? first.key : "");
   $("colour").value = colour;
   go(state);
   if (data.modes.length) play();
@@ -1072,8 +1104,9 @@
     state: () => state,
     picked: () => picked,
     webgl: Boolean(gl),
-    /** Of a live page: solve with these arguments; the status and all results. */
-    solve: (values) => {
+    /** Of a live page: solve with these arguments, from the undeformed structure where `afresh`; status and results. */
+    solve: (values, afresh = false) => {
+      if (afresh) live.forget();
       const status = live.follow(values);
       go(known);
       return { status, results: [...live.results] };

@@ -39,10 +39,9 @@ from .curves import (
 from .files import check_ending, save_figure
 from .glyphs import sketch_supports
 from .looks import dashes_of
-from .modeshapes import REACH, TWISTING
 from .sheet import DOTTED, Sheet, axes_on, drawn_text, entitle, legend_above, name_upright, plot_line
 from .showing import Picture, new_figure
-from .sketch import REST, Course, Sketch, course_of, unit_for, view_of, with_prefix
+from .sketch import REACH, REST, TWISTING, Course, Sketch, course_of, unit_for, view_of, with_prefix
 
 __all__ = ["chart", "save_chart"]
 

@@ -170,6 +170,8 @@ def _sketch_node(sketch: Sketch, name: str, node: Node) -> None:
 
 
 def _sketch_support(sketch: Sketch, name: str, node: Node) -> None:
+    if node.support == "free":
+        return
     symbol = _symbol(sketch, name, _below(sketch, name, SIDES))
     if node.support == "clamped":
         _sketch_clamp(sketch, name)

@@ -26,18 +26,14 @@ from .files import check_ending, save_figure
 from .glyphs import sketch_supports
 from .sheet import Sheet, entitle, title_of
 from .showing import new_figure
-from .sketch import REST, SUPPORT, Sketch, View, course_of, in_short, norm, view_of
+from .sketch import REACH, REST, SUPPORT, TWISTING, Sketch, View, course_of, in_short, norm, view_of
 
-__all__ = ["PHASES", "REACH", "TWISTING", "ModePanels", "mode_picture", "save_modes"]
+__all__ = ["PHASES", "ModePanels", "mode_picture", "save_modes"]
 
 MOST = 12
 """Modes drawn at most."""
-REACH = 0.13
-"""How far the largest displacement is drawn, over the size of the structure."""
 TURN, BAR, BARS = 0.7, 0.04, 13
 """Of what only twists: largest angle drawn, rad, half the length of bars over the size, and their number."""
-TWISTING = 1e-3
-"""A shape whose displacements are below this share of its rotations times the size only twists."""
 SAMPLES = 301
 """Points along a member at least: shapes of high modes bend where the equilibrium is straight."""
 PHASES = 40

@@ -26,10 +26,12 @@ __all__ = [
     "MAGNET",
     "MOTION",
     "NATURAL",
+    "REACH",
     "REACTION",
     "REST",
     "SUPPORT",
     "TENDON",
+    "TWISTING",
     "Course",
     "Ink",
     "Label",
@@ -59,6 +61,10 @@ NATURAL = ("#C44E52", "#4C72B0")
 TENDON = "#8C4A9E"
 """Colours of natural curvature to the left or in space, and to the right."""
 REST, SUPPORT = "#8C8C8C", "#333333"
+REACH = 0.13
+"""How far the largest displacement of a mode is drawn, over the size of the structure."""
+TWISTING = 1e-3
+"""A mode shape whose displacements are below this share of its rotations times the size only twists."""
 BEHIND = 1.5
 """Level of marks that are drawn behind the structure, also in space."""
 PREFIXES = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T", 15: "P"}
