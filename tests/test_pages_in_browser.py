@@ -55,6 +55,9 @@ def test_members_are_drawn_by_webgl(opened, bend):
     assert drawn > 4 * 3 * np.hypot(end[0] - begin[0], end[1] - begin[1])
     assert page.window.locator("#title").inner_text() == bend.scene.title
     assert page.window.locator("#panel-report, #panel-scene").count() == 2
+    # Nothing is said of what is between load steps.
+    assert page.window.locator(".chart svg circle title").count() == len(bend.steps)
+    assert page.window.locator(".chart svg line[stroke-width='1.6']").count() == 0
 
 
 def test_picking_reads_the_numbers_of_the_answer(opened, bend):
@@ -128,6 +131,45 @@ def test_chart_and_structure_move_each_other(opened):
     assert "neutral" in page.window.locator("#panel-answer").inner_text()
 
 
+def test_of_all_equilibria_the_usual_one_is_seen_first(opened):
+    page = opened(solve(load(PROBLEMS / "right_angled_frame_three_equilibria.toml")))
+    where = page.window.locator("#where")
+    assert page.run("sfetcas.state()") == 0 or "equilibrium 1 of" in where.inner_text()
+    assert "unstable" not in where.inner_text()
+    page.window.locator("#state").fill(page.window.locator("#state").get_attribute("max"))
+    assert "unstable" in where.inner_text()
+
+
+def test_what_is_zero_everywhere_has_no_colours(opened):
+    page = opened(solve(load(PROBLEMS / "rigid_pendulum_static.toml")))
+    chosen = page.window.locator("#colour").input_value()
+    page.window.locator("#colour").select_option("moment")
+    assert chosen != "moment"
+    assert page.window.locator("#named").inner_text() == "bending moment about z: 0 everywhere"
+    assert page.window.locator("#low").inner_text() == page.window.locator("#high").inner_text() == ""
+
+
+def test_a_large_window_shows_members_where_they_are(chromium, bend, tmp_path):
+    """Browsers draw no canvas of any size."""
+    context = chromium.new_context(viewport={"width": 2500, "height": 1400}, device_scale_factor=2)
+    page = Opened(context.new_page(), bend.page(tmp_path / "page.html"))
+    x, y = page.place(member=0, sample=20)
+    origin = page.window.locator("#members").bounding_box()
+    inked = page.run(
+        """([x, y]) => {
+          const drawn = document.getElementById("members"), copy = document.createElement("canvas");
+          const frame = drawn.getBoundingClientRect(), scale = drawn.width / frame.width;
+          [copy.width, copy.height] = [40, 40];
+          copy.getContext("2d").drawImage(drawn, x * scale - 20, y * scale - 20, 40, 40, 0, 0, 40, 40);
+          return copy.getContext("2d").getImageData(18, 18, 4, 4).data[3];
+        }""",
+        [x - origin["x"], y - origin["y"]],
+    )
+    assert inked == 255
+    assert page.said == []
+    context.close()
+
+
 def test_a_motion_plays_and_stops(opened):
     motion = solve(load(PROBLEMS / "double_pendulum_rigid.toml"))
     page = opened(motion)
@@ -152,7 +194,9 @@ def test_a_motion_plays_and_stops(opened):
 
 def test_modes_move_and_are_chosen(opened):
     page = opened(solve(load(PROBLEMS / "vibration_helix.toml")))
+    moving = page.picture()
     page.window.wait_for_timeout(150)
+    assert page.picture() != moving
     page.window.locator("#play").click()
     page.settled()
     still = page.picture()
