@@ -1,6 +1,6 @@
 """Live pages: the generated solver of a scene as WebAssembly, with what the viewer needs to run it.
 
-The same C as of :func:`~sfetcas.codegen.folder.export`, with a few functions that a page can call.
+The same C as of :func:`sfetcas.export`, with a few functions that a page can call.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def live_of(
     scene : Scene
     places : mapping of members to fractions (n,) of their length where they are shown
     arguments, settings
-        As of :func:`~sfetcas.codegen.folder.export`.
+        As of :func:`sfetcas.export`.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def live_of(
     Raises
     ------
     SceneError
-        As :func:`check_live` and :func:`~sfetcas.codegen.folder.export`; or the compiler fails.
+        As :func:`check_live` and :func:`sfetcas.export`; or the compiler fails.
     """
     check_live(scene)
     flexible = {name: x for name, x in places.items() if scene.members[name].type == "flexible"}

@@ -44,7 +44,7 @@ def page_of(
     live : bool
         Whether the page has the solver itself, as WebAssembly.
     arguments
-        Numbers of the scene that change on a live page, as of :func:`~sfetcas.codegen.folder.export`; by default the
+        Numbers of the scene that change on a live page, as of :func:`sfetcas.export`; by default the
         factor, all loads and all motions.
 
     Raises
