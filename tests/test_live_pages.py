@@ -34,9 +34,9 @@ def opened(chromium, tmp_path):
     """Opens the live page of an answer; at the end nothing has been said, and nothing asked for but the page."""
     pages = []
 
-    def open_page(answer, **how):
+    def open_page(answer, file=None, **how):
         window = chromium.new_page(viewport={"width": 1100, "height": 700})
-        pages.append(Opened(window, answer.page(tmp_path / "page.html", live=True, **how)))
+        pages.append(Opened(window, file or answer.page(tmp_path / "page.html", live=True, **how)))
         return pages[-1]
 
     yield open_page
@@ -44,6 +44,13 @@ def opened(chromium, tmp_path):
         assert page.said == []
         assert all(url.startswith(("file:", "data:", "about:")) for url in page.asked), page.asked
         page.window.close()
+
+
+@pytest.fixture(scope="module")
+def bend(tmp_path_factory):
+    """The bend and its live page, which takes some seconds to make."""
+    answer = solve(load(PROBLEMS / "bend_45_degrees.toml"))
+    return answer, answer.page(tmp_path_factory.mktemp("bend") / "page.html", live=True)
 
 
 def entered(page, at, value):
@@ -96,9 +103,9 @@ SCENES = (
 )
 
 
-def test_a_slider_changes_the_answer_as_another_run_does(opened):
-    bend = solve(load(PROBLEMS / "bend_45_degrees.toml"))
-    page = opened(bend)
+def test_a_slider_changes_the_answer_as_another_run_does(opened, bend):
+    bend, file = bend
+    page = opened(bend, file)
     assert page.run("sfetcas.webgl")
     assert told(page).startswith("Solved, residual")
     before = page.inked()
@@ -119,9 +126,9 @@ def test_a_slider_changes_the_answer_as_another_run_does(opened):
     assert page.window.locator("#number-0").input_value() == "600"
 
 
-def test_the_tip_of_a_force_is_dragged(opened):
-    bend = solve(load(PROBLEMS / "bend_45_degrees.toml"))
-    page = opened(bend)
+def test_the_tip_of_a_force_is_dragged(opened, bend):
+    bend, file = bend
+    page = opened(bend, file)
     (handle,) = page.run("sfetcas.handles()")
     begin = page.place(node="tip")
     origin = page.window.locator("#symbols").bounding_box()

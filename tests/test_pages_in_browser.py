@@ -246,3 +246,32 @@ def test_a_notebook_shows_the_same_in_a_frame(chromium, bend, tmp_path):
     assert frame.locator("#where").inner_text() == "factor 600"
     assert said == []
     window.close()
+
+
+WITHOUT = """
+const before = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+  return kind.startsWith("webgl") ? null : before.call(this, kind, ...more);
+};
+"""
+"""What a browser does that has WebGL switched off."""
+
+
+def test_without_webgl_members_are_flat_lines(chromium, bend, tmp_path):
+    """In their colours all the same."""
+    window = chromium.new_page(viewport={"width": 1100, "height": 700})
+    window.add_init_script(WITHOUT)
+    page = Opened(window, bend.page(tmp_path / "page.html"))
+    assert not page.run("sfetcas.webgl")
+    drawn = page.inked()
+    begin, end = page.place(node="root"), page.place(node="tip")
+    assert drawn > 3 * np.hypot(end[0] - begin[0], end[1] - begin[1])
+    coloured = page.picture()
+    page.window.locator("#colour").select_option("")
+    page.settled()
+    assert page.picture() != coloured
+    assert page.inked() == pytest.approx(drawn, rel=0.05)
+    page.click(node="tip")
+    assert numbers(page.told("position")) == bend.last.position("tip").tolist()
+    assert page.said == []
+    window.close()

@@ -244,8 +244,7 @@
     const values = colour ? numbers(states[state].values, colour) || new Float64Array(total) : null;
     const lines = drawn();
     if (!gl) {
-      const pen = penOf(paper);
-      trace(pen, lines, "#1f3a5f", 2 * MEMBER);
+      trace(penOf(paper), lines, "#1f3a5f", 2 * MEMBER, values && ((i) => inkOf(0.5 * (values[i] + values[i + 1]))));
       return;
     }
     // Of large canvases browsers draw smaller ones.
@@ -274,20 +273,35 @@
     pen.lineJoin = pen.lineCap = "round";
     return pen;
   };
-  /** All members as plain lines: undeformed, or where there is no WebGL. */
-  const trace = (pen, lines, ink, width) => {
+  /** All members as flat lines, undeformed, or where there is no WebGL; `inks` gives the colours of their segments. */
+  const trace = (pen, lines, ink, width, inks) => {
     pen.strokeStyle = ink;
     pen.lineWidth = width;
     pen.beginPath();
     members.forEach((_, m) => {
-      for (let i = starts[m]; i < starts[m + 1]; i++) pen[i === starts[m] ? "moveTo" : "lineTo"](...seen(lines[3 * i], lines[3 * i + 1], lines[3 * i + 2]));
+      for (let i = starts[m]; i < starts[m + 1]; i++) {
+        const place = seen(lines[3 * i], lines[3 * i + 1], lines[3 * i + 2]);
+        if (i === starts[m]) pen.moveTo(...place);
+        else pen.lineTo(...place);
+        if (inks && i > starts[m]) {
+          pen.strokeStyle = inks(i - 1);
+          pen.stroke();
+          pen.beginPath();
+          pen.moveTo(...place);
+        }
+      }
     });
-    pen.stroke();
+    if (!inks) pen.stroke();
   };
 
   // -- colours --------------------------------------------------------------------------------------------------------
 
   const ranges = {}, nothing = {};
+  let pixels = null;
+  const inkOf = (value) => {
+    const [low, high] = range(colour), at = 4 * Math.round(255 * Math.min(Math.max((value - low) / (high - low), 0), 1));
+    return Number.isFinite(value) ? `rgb(${pixels[at]}, ${pixels[at + 1]}, ${pixels[at + 2]})` : "#b3b3b3";
+  };
   /** Least and largest value of a quantity in all states; alike on both sides of zero where it has a sign. */
   const range = (key) => {
     if (!key) return [0, 1];
@@ -310,7 +324,7 @@
     $("legend").hidden = !key;
     if (key) {
       const one = quantities.find((found) => found.key === key), stops = COLOURS[one.signed ? "signed" : "sizes"];
-      const pixels = new Uint8ClampedArray(4 * 256);
+      pixels = new Uint8ClampedArray(4 * 256);
       for (let i = 0; i < 256; i++) {
         const x = i / 255, next = Math.max(1, stops.findIndex((stop) => stop[0] >= x)), [from, to] = [stops[next - 1], stops[next]];
         const share = (x - from[0]) / (to[0] - from[0]);
@@ -1035,7 +1049,7 @@
   const option = (select, value, text) => (made("option", text, select).value = value);
   option($("colour"), "", "none");
   for (const one of data.modes.length ? [] : quantities) option($("colour"), one.key, one.label);
-  $("colour").parentElement.hidden = !gl || data.modes.length > 0;
+  $("colour").parentElement.hidden = data.modes.length > 0;
   $("colour").addEventListener("change", () => setColour($("colour").value));
   for (const [name, right, up] of [["x-y", [1, 0, 0], [0, 1, 0]], ["x-z", [1, 0, 0], [0, 0, 1]], ["y-z", [0, 1, 0], [0, 0, 1]]].slice(0, data.plane ? 0 : 3)) {
     const button = made("button", name, $("turns"));
@@ -1090,7 +1104,7 @@
   resize();
   // What is zero everywhere needs no colours.
   const first = quantities.find((one) => range(one.key) && !nothing[one.key]);
-  setColour(gl && first && !data.modes.length ? first.key : "");
+  setColour(first && !data.modes.length ? first.key : "");
   $("colour").value = colour;
   go(state);
   if (data.modes.length) play();
