@@ -76,17 +76,26 @@ class Opened:
 
     def inked(self):
         """Number of pixels of members that are drawn."""
+        return self._pixels("count")
+
+    def inks(self):
+        """Number of colours that members are drawn in."""
+        return self._pixels("inks.size")
+
+    def _pixels(self, what):
         return self.run(
-            """() => {
+            f"""() => {{
               const drawn = document.getElementById("members"), copy = document.createElement("canvas");
               [copy.width, copy.height] = [drawn.width, drawn.height];
-              const pen = copy.getContext("2d");
+              const pen = copy.getContext("2d"), inks = new Set();
               pen.drawImage(drawn, 0, 0);
               let count = 0;
-              for (const pixel of new Uint32Array(pen.getImageData(0, 0, copy.width, copy.height).data.buffer))
+              for (const pixel of new Uint32Array(pen.getImageData(0, 0, copy.width, copy.height).data.buffer)) {{
                 count += pixel >>> 24 > 0;
-              return count;
-            }"""
+                if (pixel >>> 24 === 255) inks.add(pixel);
+              }}
+              return {what};
+            }}"""
         )
 
     def picture(self):
