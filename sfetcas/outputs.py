@@ -105,10 +105,11 @@ def outputs_of_page(
         Its ending is no page's, it cannot be written, or is the scene itself; no live page shows the scene.
     """
     from .pages.live import check_live
-    from .pages.page import check_page, page_of
+    from .pages.page import ENDINGS, page_of
+    from .pictures.files import check_ending
 
     path = options.page
-    check_page(path)
+    _placed(path, lambda: check_ending(path, ENDINGS, "a page"))
     _check_writable(path)
     if path.exists() and path.samefile(options.file):
         raise SceneError(f"{path}: is the scene itself, accepted: another file")

@@ -1,6 +1,5 @@
 """A browser for tests of pages: Chromium as the system has it, driven by Playwright."""
 
-import contextlib
 import os
 import shutil
 import time
@@ -18,8 +17,8 @@ FLAGS = [
 ]
 
 
-@contextlib.contextmanager
-def browser():
+@pytest.fixture(scope="module")
+def chromium():
     """A browser; without one what needs it is skipped, but not in continuous integration, which has to have one."""
     program = next(filter(None, map(shutil.which, PROGRAMS)), None)
     if program is None and not os.environ.get("CI"):
@@ -105,3 +104,23 @@ class Opened:
     def told(self, key, table=0):
         """The text of a value among the values that are told."""
         return self.window.locator(f"#panel-values table:nth-of-type({table + 1}) td[data-key='{key}']").inner_text()
+
+
+@pytest.fixture
+def opened(chromium, tmp_path):
+    """Opens the page of an answer, or one that is there, in a new window or a given one.
+
+    At the end pages have said nothing, and asked for nothing but themselves.
+    """
+    pages = []
+
+    def open_page(answer, file=None, window=None, **how):
+        window = window or chromium.new_page(viewport={"width": 1100, "height": 700})
+        pages.append(Opened(window, file or answer.page(tmp_path / "page.html", **how)))
+        return pages[-1]
+
+    yield open_page
+    for page in pages:
+        assert page.said == []
+        assert all(url.startswith(("file:", "data:", "about:")) for url in page.asked), page.asked
+        page.window.close()

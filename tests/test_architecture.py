@@ -389,7 +389,6 @@ PROGRAMS = ("cli", "reports")
 """Modules of the package that print."""
 
 PICTURES = (
-    "pictures.files",
     "pictures.showing",
     "pictures.sheet",
     "pictures.plotting",

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Opened, browser
 
 from sfetcas import Scene, SceneError, load, solve
 from sfetcas.cli import main
@@ -17,33 +16,11 @@ from sfetcas.pages.content import content_of
 from sfetcas.parametric.equilibrium import equilibrium_solver
 
 pytest.importorskip("playwright")
+pytest_plugins = ("browser",)
 PROBLEMS = Path(__file__).parent.parent / "problems"
 
 if importlib.util.find_spec("ziglang") is None and not os.environ.get("CI"):
     pytest.skip("found no compiler for WebAssembly", allow_module_level=True)
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as found:
-        yield found
-
-
-@pytest.fixture
-def opened(chromium, tmp_path):
-    """Opens the live page of an answer; at the end nothing has been said, and nothing asked for but the page."""
-    pages = []
-
-    def open_page(answer, file=None, **how):
-        window = chromium.new_page(viewport={"width": 1100, "height": 700})
-        pages.append(Opened(window, file or answer.page(tmp_path / "page.html", live=True, **how)))
-        return pages[-1]
-
-    yield open_page
-    for page in pages:
-        assert page.said == []
-        assert all(url.startswith(("file:", "data:", "about:")) for url in page.asked), page.asked
-        page.window.close()
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +139,7 @@ def test_a_support_is_dragged(opened):
         }
     )
     answer = solve(scene)
-    page = opened(answer, arguments=["motions.push.displacement"])
+    page = opened(answer, live=True, arguments=["motions.push.displacement"])
     (handle,) = page.run("sfetcas.handles()")
     assert handle["kind"] == "place"
     x, y = page.place(node="B")
@@ -176,7 +153,7 @@ def test_a_snap_is_told(opened):
     path = solve(load(PROBLEMS / "arch_120_degrees_crown_load.toml"))
     limit = min(point.factor for point in path.limit_points if point.factor > 0)
     scene = path.scene.replace(analysis={"type": "static", "steps": [0.5 * limit], "accuracy": 1e-5})
-    page = opened(solve(scene), arguments={"factor": (0.0, 3.0 * limit)})
+    page = opened(solve(scene), live=True, arguments={"factor": (0.0, 3.0 * limit)})
     entered(page, 0, 0.7 * limit)
     assert told(page).startswith("Solved, residual")
     entered(page, 0, 1.4 * limit)
@@ -194,7 +171,7 @@ def test_a_snap_is_told(opened):
 def test_the_page_finds_what_the_process_finds(opened, name):
     scene = load(PROBLEMS / f"{name}.toml")
     answer = solve(scene)
-    page = opened(answer)
+    page = opened(answer, live=True)
     found = content_of(answer)
     flexible = {m["name"]: m["x"] for m in found["members"] if m["type"] == "flexible"}
     solver = equilibrium_solver(scene, "live", places=flexible, stopped=scene.stopped, touching=True, watched=True)

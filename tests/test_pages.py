@@ -193,7 +193,7 @@ displacement = [1, 0]
 @pytest.mark.parametrize(
     ("out", "code", "sentence"),
     [
-        ("page.txt", 2, "found the ending '.txt', accepted: .html, .htm"),
+        ("page.txt", 2, "found the ending '.txt' of a page, accepted: .html, .htm"),
         (
             "nowhere/page.html",
             2,
@@ -268,7 +268,7 @@ def test_the_scene_itself_is_no_page(tmp_path, capsys):
 def test_pages_from_python(tmp_path, bend):
     assert bend.page(tmp_path / "bend.html") == tmp_path / "bend.html"
     assert held((tmp_path / "bend.html").read_text(encoding="utf-8"))["report"] == repr(bend)
-    with pytest.raises(SceneError, match=r"found the ending '\.png', accepted: \.html"):
+    with pytest.raises(SceneError, match=r"found the ending '\.png' of a page, accepted: \.html"):
         bend.page(tmp_path / "bend.png")
     frame = bend.view()._repr_html_()
     assert frame.startswith('<iframe sandbox="allow-scripts"')

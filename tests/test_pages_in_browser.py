@@ -5,36 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Opened, browser
 
 from sfetcas import Scene, load, solve
 
 pytest.importorskip("playwright")
+pytest_plugins = ("browser",)
 PROBLEMS = Path(__file__).parent.parent / "problems"
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as found:
-        yield found
-
-
-@pytest.fixture
-def opened(chromium, tmp_path):
-    """Opens the page of an answer; at the end nothing has been said, and nothing asked for but the page."""
-    pages = []
-
-    def open_page(answer):
-        file = answer.page(tmp_path / "page.html")
-        window = chromium.new_page(viewport={"width": 1100, "height": 700})
-        pages.append(Opened(window, file))
-        return pages[-1]
-
-    yield open_page
-    for page in pages:
-        assert page.said == []
-        assert all(url.startswith(("file:", "data:", "about:")) for url in page.asked), page.asked
-        page.window.close()
 
 
 @pytest.fixture(scope="module")
@@ -149,10 +125,10 @@ def test_what_is_zero_everywhere_has_no_colours(opened):
     assert page.window.locator("#low").inner_text() == page.window.locator("#high").inner_text() == ""
 
 
-def test_a_large_window_shows_members_where_they_are(chromium, bend, tmp_path):
+def test_a_large_window_shows_members_where_they_are(chromium, opened, bend):
     """Browsers draw no canvas of any size."""
     context = chromium.new_context(viewport={"width": 2500, "height": 1400}, device_scale_factor=2)
-    page = Opened(context.new_page(), bend.page(tmp_path / "page.html"))
+    page = opened(bend, window=context.new_page())
     x, y = page.place(member=0, sample=20)
     origin = page.window.locator("#members").bounding_box()
     inked = page.run(
@@ -166,8 +142,6 @@ def test_a_large_window_shows_members_where_they_are(chromium, bend, tmp_path):
         [x - origin["x"], y - origin["y"]],
     )
     assert inked == 255
-    assert page.said == []
-    context.close()
 
 
 def test_a_motion_plays_and_stops(opened):
@@ -257,11 +231,11 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
 """What a browser does that has WebGL switched off."""
 
 
-def test_without_webgl_members_are_flat_lines(chromium, bend, tmp_path):
+def test_without_webgl_members_are_flat_lines(chromium, opened, bend):
     """In their colours all the same."""
     window = chromium.new_page(viewport={"width": 1100, "height": 700})
     window.add_init_script(WITHOUT)
-    page = Opened(window, bend.page(tmp_path / "page.html"))
+    page = opened(bend, window=window)
     assert not page.run("sfetcas.webgl")
     drawn = page.inked()
     begin, end = page.place(node="root"), page.place(node="tip")
@@ -273,5 +247,3 @@ def test_without_webgl_members_are_flat_lines(chromium, bend, tmp_path):
     assert page.inked() == pytest.approx(drawn, rel=0.05)
     page.click(node="tip")
     assert numbers(page.told("position")) == bend.last.position("tip").tolist()
-    assert page.said == []
-    window.close()

@@ -17,16 +17,18 @@ import numpy as np
 from ..errors import SceneError
 from ..files import write_file
 from ..parametric.arguments import Asked
+from ..pictures.files import check_ending
 from .content import Shown, content_of
 from .live import check_live, live_of
 
-__all__ = ["View", "check_page", "page_of", "save_page"]
+__all__ = ["ENDINGS", "View", "page_of", "save_page"]
 
 PARTS = File(__file__).parent
 HEIGHT = 560
 """Of a page in a notebook, pixels."""
 
 ENDINGS = (".html", ".htm")
+"""Endings of the files that pages are written to."""
 
 
 def page_of(
@@ -78,19 +80,6 @@ def page_of(
     return re.sub(r"@(title|style|viewer|wasm|content)@", lambda found: parts[found[1]], template)
 
 
-def check_page(file: str | os.PathLike[str]) -> None:
-    """Refuse a file that is no page by its ending.
-
-    Raises
-    ------
-    SceneError
-        The ending is another one.
-    """
-    ending = File(file).suffix
-    if ending.lower() not in ENDINGS:
-        raise SceneError(f"{os.fspath(file)}: found the ending {ending!r}, accepted: {', '.join(ENDINGS)}")
-
-
 def save_page(answer: Shown, file: str | os.PathLike[str], *, live: bool = False, arguments: Asked = None) -> None:
     """Write :func:`page_of` to a file, all of it or nothing.
 
@@ -99,7 +88,7 @@ def save_page(answer: Shown, file: str | os.PathLike[str], *, live: bool = False
     SceneError
         As :func:`page_of`; the file has another ending, or cannot be written.
     """
-    check_page(file)
+    check_ending(file, ENDINGS, "a page")
     text = page_of(answer, live=live, arguments=arguments)
     write_file(File(file), lambda path: path.write_text(text, encoding="utf-8"))
 

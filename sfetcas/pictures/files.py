@@ -5,10 +5,12 @@ from __future__ import annotations
 import io
 import os
 from pathlib import Path
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
 from ..errors import SceneError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["DPI", "ENDINGS", "check_ending", "check_folder", "save_figure"]
 
