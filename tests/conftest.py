@@ -8,6 +8,9 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from browser import chromium, opened
+
+__all__ = ["chromium", "opened"]
 
 DURATIONS = Path(__file__).with_name("durations.txt")
 FAST = 0.2

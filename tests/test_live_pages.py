@@ -16,7 +16,6 @@ from sfetcas.pages.content import content_of
 from sfetcas.parametric.equilibrium import equilibrium_solver
 
 pytest.importorskip("playwright")
-pytest_plugins = ("browser",)
 PROBLEMS = Path(__file__).parent.parent / "problems"
 
 if importlib.util.find_spec("ziglang") is None and not os.environ.get("CI"):

@@ -9,7 +9,6 @@ import pytest
 from sfetcas import Scene, load, solve
 
 pytest.importorskip("playwright")
-pytest_plugins = ("browser",)
 PROBLEMS = Path(__file__).parent.parent / "problems"
 
 
