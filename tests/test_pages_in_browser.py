@@ -84,6 +84,8 @@ def test_chart_and_structure_move_each_other(opened):
     path = solve(load(PROBLEMS / "lee_frame.toml"))
     page = opened(path)
     kinds = [point.kind for point in path.points]
+    # What was asked for besides is no part of the course.
+    assert page.window.locator(".chart svg line[stroke-width='1.6']").count() == len(kinds) - 1
     first = kinds.index("limit point")
     at = page.window.locator(".chart svg circle title", has_text="limit point").first
     box = at.locator("..").bounding_box()
