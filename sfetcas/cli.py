@@ -468,7 +468,7 @@ def _reported(options: argparse.Namespace, begin: float, scene: Scene, outputs: 
 def _page(options: argparse.Namespace) -> int:
     begin, scene = time.perf_counter(), load(options.file)
     spans = dict(_span(text) for text in options.argument) if options.argument else None
-    return _reported(options, begin, scene, outputs_of_page(options, scene, spans))
+    return _reported(options, begin, scene, outputs_of_page(options, scene, spans, _settings(options)))
 
 
 def _give(answer: object, show: Callable[[], object], outputs: Sequence[Output]) -> None:

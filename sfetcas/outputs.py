@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .description.scene import Scene
+from .equilibria.settings import Settings
 from .errors import SceneError
 from .files import write_file, write_folder
 from .reports import report
@@ -95,9 +96,13 @@ def outputs_of(options: argparse.Namespace, scene: Scene) -> list[Output]:
 
 
 def outputs_of_page(
-    options: argparse.Namespace, scene: Scene, arguments: Mapping[str, tuple[float, float] | None] | None
+    options: argparse.Namespace,
+    scene: Scene,
+    arguments: Mapping[str, tuple[float, float] | None] | None,
+    settings: Settings,
 ) -> list[Output]:
-    """The page that is asked for, checked before anything is solved; ``arguments`` are those of a live one.
+    """The page that is asked for, checked before anything is solved; ``arguments`` and ``settings`` are those of the
+    solver of a live one.
 
     Raises
     ------
@@ -122,7 +127,8 @@ def outputs_of_page(
     def write(answer: Any, there: Path) -> None:
         with contextlib.redirect_stdout(io.StringIO()) as said:
             report(answer, sum(answer.seconds.values()))
-        page = page_of(answer, source, said.getvalue(), live=options.live, arguments=arguments)
+        how: dict[str, Any] = {"live": options.live, "arguments": arguments, "settings": settings}
+        page = page_of(answer, source, said.getvalue(), **how)
         there.write_text(page, encoding="utf-8")
 
     return [Output("OUT.html", path, write)]

@@ -11,7 +11,7 @@ import pytest
 
 from sfetcas import Scene, SceneError, load, solve
 from sfetcas.cli import main
-from sfetcas.pages import live
+from sfetcas.pages import live, page
 from sfetcas.pages.content import content_of
 from sfetcas.parametric.equilibrium import equilibrium_solver
 
@@ -121,6 +121,37 @@ def test_the_tip_of_a_force_is_dragged(opened, bend):
     there = solve(bend.scene.replace({"loads.tip.value": values[1:], "analysis.steps": [600.0]}))
     error = 10.0 * bend.scene.analysis.accuracy * 100.0
     assert shown(page, "tip") == pytest.approx(there.last.position("tip").tolist(), abs=error)
+
+
+def test_numbers_of_one_force_are_one_arrow():
+    """With the components that are no arguments as they are in the scene."""
+    scene = load(PROBLEMS / "bend_45_degrees.toml").replace({"loads.tip.value": [0.5, 0.25, 1.0]})
+    first = {"name": "loads.tip.value.2", "first": 0, "size": 1}
+    arguments = [first, {"name": "factor", "first": 1, "size": 1}, {"name": "loads.tip.value.0", "first": 2, "size": 1}]
+    (handle,) = live._handles(scene, arguments)
+    assert handle["value"] == [0.5, 0.25, 1.0]
+    assert handle["parts"] == [[2, 0], [0, 2]]
+
+
+def test_settings_of_the_command_are_those_of_the_solver_in_the_page(tmp_path, monkeypatch):
+    """A page of fewer elements has a solver of fewer."""
+    given = []
+    monkeypatch.setattr(page, "live_of", lambda scene, places, arguments, settings: given.append(settings) or {})
+    words = ["page", str(PROBLEMS / "bend_45_degrees.toml"), str(tmp_path / "page.html"), "--live", "--elements", "3"]
+    assert main([*words, "--accuracy", "1e-3"]) in (0, 1)
+    assert given[0].elements == 3
+    assert given[0].accuracy == 1e-3
+
+
+def test_where_the_first_solve_finds_nothing_the_answer_stays(opened, bend):
+    """As where a start place or the way of the steps is what an answer hangs on."""
+    answer, file = bend
+    page = opened(answer, file)
+    assert page.run("(values) => sfetcas.solve(values, true).status", [1e300, 0.0, 0.0, 1.0]) > 1
+    assert told(page).startswith("No solution")
+    page.click(node="tip")
+    page.settled()
+    assert page.inked() > 0
 
 
 def test_a_support_is_dragged(opened):

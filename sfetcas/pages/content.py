@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -24,7 +24,7 @@ from ..mathematics.arrays import Array
 from ..paths.path import Path
 from ..pictures.colours import QUANTITIES, ColourQuantity
 from ..pictures.glyphs import STANDING, carried_along, sketch_loads, sketch_supports
-from ..pictures.sketch import REACH, TWISTING, Course, Sketch, in_short, prefix, tangents_of, view_of
+from ..pictures.sketch import REACH, TWISTING, Course, Sketch, View, in_short, prefix, turning_of, view_of
 
 __all__ = ["Shown", "content_of"]
 
@@ -76,16 +76,15 @@ class _State:
     stable: bool | str | None = None
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True)
 class _Numbers:
     """Packs arrays of numbers in one precision."""
 
-    exact: bool
-    kinds: dict[bool, str] = field(default_factory=lambda: {True: "<f8", False: "<f4"})
+    bits: int
 
     def packed(self, values: Any) -> str:
         """An array as text."""
-        return base64.b64encode(np.ascontiguousarray(values, self.kinds[self.exact]).tobytes()).decode()
+        return base64.b64encode(np.ascontiguousarray(values, f"<f{self.bits // 8}").tobytes()).decode()
 
 
 def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any]:
@@ -116,21 +115,21 @@ def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any
     }
     places = _places(states, len(quantities))
     count = sum(map(len, places.values())) * len(states) * (3 + len(quantities))
-    numbers = _Numbers(count <= EXACT_NUMBERS)
+    numbers = _Numbers(64 if count <= EXACT_NUMBERS else 32)
     fields = [{name: state.step.along(name, x) for name, x in places.items()} for state in states]
     lines = [[found["position"] for found in one.values()] for one in fields]
     rest = [scene.center_lines[name].positions(x) for name, x in places.items()]
     shapes = _Shapes(answer, places, lines[0]) if isinstance(answer, Modes) else None
     everything = np.vstack([*rest, *(line for one in lines for line in one), *(shapes.farthest if shapes else ())])
     view = view_of(space, [everything])
-    symbols = _Symbols(states, lines, rest, isinstance(answer, Trajectory))
+    symbols = _Symbols(states, lines, rest, view, isinstance(answer, Trajectory))
     found: dict[str, Any] = {
         "title": scene.title,
         "kind": scene.analysis.type,
         "status": answer.status.value,
         "plane": not space,
         "all": scene.analysis.equilibria == "all",
-        "bits": 64 if numbers.exact else 32,
+        "bits": numbers.bits,
         "view": {"right": view.right.tolist(), "up": view.up.tolist()},
         "seconds": _seconds(answer, states),
         "gravity": plain(scene.gravity) if scene.gravity and any(scene.gravity) else None,
@@ -270,7 +269,7 @@ def _places(states: Sequence[_State], quantities: int) -> dict[str, Array]:
     wanted = {}
     for name, member in scene.members.items():
         straight = member.type == "rigid" and scene.center_lines[name].turning == 0.0
-        turning = 0.0 if straight else max(_turning(state.step, name) for state in (*looked_at, states[-1]))
+        turning = 0.0 if straight else max(turning_of(state.step, name) for state in (*looked_at, states[-1]))
         wanted[name] = 2 if straight else int(np.clip(1 + math.ceil(turning / TURNING), SMOOTH, MOST_PLACES))
     room = MOST_NUMBERS / (len(states) * (3 + quantities) * max(sum(wanted.values()), 1))
     found = {}
@@ -281,14 +280,6 @@ def _places(states: Sequence[_State], quantities: int) -> dict[str, Array]:
             x = np.union1d(x, states[-1].step.places(name))
         found[name] = x
     return found
-
-
-def _turning(step: Configuration, member: str) -> float:
-    """How far the tangent of a member turns along it, rad."""
-    tangents = tangents_of(step, member, step.model.along(member))
-    turned = np.linalg.norm(np.diff(tangents, axis=0), axis=1)
-    bent = float((2.0 * np.arcsin(np.clip(0.5 * turned, 0.0, 1.0))).sum())
-    return max(bent, step.model.scene.center_lines[member].turning)
 
 
 def _values(
@@ -355,18 +346,22 @@ class _Symbols:
     """Supports, joints, obstacles, loads and reactions of all states, each symbol once."""
 
     def __init__(
-        self, states: Sequence[_State], lines: Sequence[Sequence[Array]], rest: Sequence[Array], moving: bool
+        self,
+        states: Sequence[_State],
+        lines: Sequence[Sequence[Array]],
+        rest: Sequence[Array],
+        view: View,
+        moving: bool,
     ) -> None:
         self.known: list[dict[str, Any]] = []
         self._numbers: dict[Any, int] = {}
-        self._states, self._moving = states, moving
+        self._moving = moving
         scene = states[-1].step.model.scene
         extent = float(np.ptp(np.vstack([*rest, *(line for one in lines for line in one)]), axis=0).max())
         self._unit, letter = prefix(extent, 0.2)
         drawn = [[line / self._unit for line in one] for one in lines]
         still = [line / self._unit for line in rest]
         course = Course(self._unit, letter, tuple(scene.members), still, drawn[-1], drawn, [])
-        view = view_of(states[-1].step.model.space, [course.everything])
         self._sketches = [
             Sketch(scene, state.step, replace(course, last=own), view) for state, own in zip(states, drawn, strict=True)
         ]

@@ -13,11 +13,13 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..codegen.folder import export
+from ..description.loads import Load, Motion
+from ..description.records import plain
 from ..description.scene import Scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError
@@ -95,9 +97,8 @@ def live_of(
     Raises
     ------
     SceneError
-        As :func:`check_live` and :func:`sfetcas.export`; or the compiler fails.
+        As :func:`sfetcas.export`; there is no compiler, or it fails.  :func:`check_live` has to accept the scene.
     """
-    check_live(scene)
     flexible = {name: x for name, x in places.items() if scene.members[name].type == "flexible"}
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / NAME
@@ -115,7 +116,7 @@ def live_of(
             {key: one[key] for key in ("name", "unit", "first", "size", "default")} | {"spans": spans[one["name"]]}
             for one in manifest["arguments"]
         ],
-        "handles": list(_handles(scene, manifest["arguments"])),
+        "handles": _handles(scene, manifest["arguments"]),
         "factor": scene.analysis.steps[-1],
         "results": [{key: one[key] for key in ("name", "first", "size", "shape")} for one in manifest["results"]],
         "statuses": manifest["statuses"],
@@ -123,20 +124,39 @@ def live_of(
     }
 
 
-def _handles(scene: Scene, arguments: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Arguments that are dead forces on nodes, or displacements of nodes, and where their numbers begin."""
+def _handles(scene: Scene, arguments: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Dead forces on nodes and displacements of nodes of which numbers are arguments, each once.
+
+    ``value`` is the vector in the scene, ``parts`` which of its components are which numbers of the arguments.
+    """
+    found: dict[tuple[str, str], dict[str, Any]] = {}
     for one in arguments:
         table, _, rest = one["name"].partition(".")
-        record, _, key = rest.partition(".")
-        told = {"first": one["first"], "components": one.get("components") or list(range(one["size"]))}
-        if table == "loads" and key.startswith("value"):
-            load = scene.loads[record]
-            if load.type == "force" and load.node is not None and load.frame == "fixed":
-                yield {"kind": "force", "node": load.node, "grows": load.history is None, **told}
-        if table == "motions" and key.startswith("displacement"):
-            motion = scene.motions[record]
-            if scene.nodes[motion.node].support != "free":
-                yield {"kind": "place", "node": motion.node, "grows": motion.history is None, **told}
+        record, _, rest = rest.partition(".")
+        key, _, component = rest.partition(".")
+        acts: Load | Motion
+        value: Any
+        if (table, key) == ("loads", "value"):
+            acts = scene.loads[record]
+            value, held = acts.value, acts.type == "force" and acts.node is not None and acts.frame == "fixed"
+        elif (table, key) == ("motions", "displacement"):
+            acts = scene.motions[record]
+            value, held = acts.displacement, scene.nodes[acts.node].support != "free"
+        else:
+            continue
+        if held:
+            kind = "force" if table == "loads" else "place"
+            vector = {
+                "kind": kind,
+                "node": acts.node,
+                "grows": acts.history is None,
+                "value": plain(value),
+                "parts": [],
+            }
+            axes = [int(component)] if component else one.get("components") or range(one["size"])
+            parts = found.setdefault((table, record), vector)["parts"]
+            parts += [[axis, one["first"] + i] for i, axis in enumerate(axes)]
+    return list(found.values())
 
 
 def _spans(argument: Argument) -> list[list[float]]:

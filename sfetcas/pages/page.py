@@ -14,6 +14,7 @@ from pathlib import Path as File
 
 import numpy as np
 
+from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..files import write_file
 from ..parametric.arguments import Asked
@@ -32,7 +33,13 @@ ENDINGS = (".html", ".htm")
 
 
 def page_of(
-    answer: Shown, source: str | None = None, said: str | None = None, *, live: bool = False, arguments: Asked = None
+    answer: Shown,
+    source: str | None = None,
+    said: str | None = None,
+    *,
+    live: bool = False,
+    arguments: Asked = None,
+    settings: Settings | None = None,
 ) -> str:
     """The text of a page that shows an answer.
 
@@ -46,8 +53,10 @@ def page_of(
     live : bool
         Whether the page has the solver itself, as WebAssembly.
     arguments
-        Numbers of the scene that change on a live page, as of :func:`sfetcas.export`; by default the
-        factor, all loads and all motions.
+        Numbers of the scene that change on a live page, as of :func:`sfetcas.export`; by default the factor, all loads
+        and all motions.
+    settings : Settings, optional
+        Accuracy and elements of the solver of a live page.
 
     Raises
     ------
@@ -65,7 +74,7 @@ def page_of(
     found = content_of(answer, source, said)
     if live:
         places = {member["name"]: np.array(member["x"]) for member in found["members"]}
-        found["live"] = live_of(answer.scene, places, arguments)
+        found["live"] = live_of(answer.scene, places, arguments, settings)
     content = json.dumps(found, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
     parts = {
         "title": html.escape(answer.scene.title or "sfetcas"),

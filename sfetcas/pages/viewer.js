@@ -74,7 +74,7 @@
   const cloud = [];
   const gather = (line, most) => {
     const every = Math.max(1, Math.ceil(line.length / 3 / most));
-    for (let i = 0; i + 2 < line.length; i += 3 * every) if (Number.isFinite(line[i]) && line[i] !== null) cloud.push(line[i], line[i + 1], line[i + 2]);
+    for (let i = 0; i + 2 < line.length; i += 3 * every) if (Number.isFinite(line[i])) cloud.push(line[i], line[i + 1], line[i + 2]);
   };
   gather(numbers(data, "rest"), 2000);
   states.forEach((_, number) => gather(linesOf(number), Math.max(20, 20000 / states.length)));
@@ -83,7 +83,7 @@
   const camera = { centre: [...origin], right: [...data.view.right], up: [...data.view.up], scale: 1 };
   const size = { width: 1, height: 1, ratio: 1 };
 
-  /** Pixels from the left and from above, and how near, of a place. */
+  /** Pixels from the left and from above of a place. */
   const seen = (x, y, z) => {
     const d = [x - camera.centre[0], y - camera.centre[1], z - camera.centre[2]];
     return [0.5 * size.width + camera.scale * dot(camera.right, d), 0.5 * size.height - camera.scale * dot(camera.up, d)];
@@ -112,7 +112,7 @@
     return vector.map((x, i) => c * x + s * w[i] + k * axis[i]);
   };
   const turn = (dx, dy) => {
-    const { right, up } = camera, toward = cross(right, up);
+    const { right, up } = camera;
     const about = (v) => turned(turned(v, up, -dx / 150), right, -dy / 150);
     const [r, u] = [about(right), about(up)];
     // What rounding has left is taken out, so that any number of turns keeps the shape.
@@ -120,7 +120,6 @@
     camera.right = r.map((x) => x / length);
     const share = dot(camera.right, u), across = u.map((x, i) => x - share * camera.right[i]), high = Math.hypot(...across);
     camera.up = across.map((x) => x / high);
-    return toward;
   };
   const pan = (dx, dy) => {
     for (let i = 0; i < 3; i++) camera.centre[i] += (-dx * camera.right[i] + dy * camera.up[i]) / camera.scale;
@@ -853,8 +852,9 @@
     for (const one of given.arguments) defaults.set([].concat(one.default), one.first);
     const sentences = {}, fields = [], spent = { count: 0, time: 0 };
     for (const one of Object.values(given.statuses)) sentences[one.value] = one.meaning;
-    const here = { text: "live", at: 0, branch: 0, kind: "live", stable: null, values: {}, told: {}, symbols: [], labels: [] };
-    here.symbols = states[known - 1].symbols.filter((number) => data.symbols[number].stands);
+    // Until something is solved it is as the last state of the answer.
+    const here = { ...states[known - 1], kind: "live", labels: [] };
+    here.symbols = here.symbols.filter((number) => data.symbols[number].stands);
     let now = null, lines = Float64Array.from(linesOf(known - 1)), snapped = false;
     states.push(here);
 
@@ -904,8 +904,11 @@
         }
         const middle = [...moves].sort((a, b) => a - b)[moves.length >> 1];
         snapped = good && Math.max(...moves) > Math.max(JUMP * extent, SNAPS * middle);
-        if (!good) status = solve(values, false);
-      } else if (!from && !holds(status)) status = solve(values, false);
+        if (!good) {
+          status = solve(values, false);
+          snapped = holds(status);
+        }
+      }
       if (holds(status)) [now, lines] = [values, places()];
       else if (from) code.live_back();
       tell(status, values);
@@ -947,9 +950,10 @@
           const [table, record, key] = one.name.split("."), own = [...results.slice(one.first, one.first + one.size)];
           const value = one.shape.length ? own : own[0];
           if (table === "members") continue;
-          if (key === undefined) (told[table] ??= {})[record] = value;
-          else ((told[table] ??= {})[record] ??= {})[key] = value;
+          if (key === undefined) (told[table] ??= Object.create(null))[record] = value;
+          else ((told[table] ??= Object.create(null))[record] ??= {})[key] = value;
         }
+        here.at = factor ? values[factor.first] : given.factor;
         here.lines = lines;
         here.values = sections();
         for (const key of Object.keys(ranges)) delete ranges[key];
@@ -968,9 +972,9 @@
     const factor = given.arguments.find((one) => one.name === "factor");
     const grown = (handle, values) => (!handle.grows ? 1 : factor ? values[factor.first] : given.factor);
     const vectorOf = (handle, values, by) => {
-      const found = [0, 0, 0];
-      handle.components.forEach((axis, i) => { found[axis] = by * values[handle.first + i]; });
-      return found;
+      const found = [...handle.value];
+      for (const [axis, at] of handle.parts) found[axis] = values[at];
+      return found.map((one) => by * one);
     };
     const forces = given.handles.filter((one) => one.kind === "force");
     const largest = Math.max(0, ...forces.map((one) => Math.hypot(...vectorOf(one, defaults, grown(one, defaults)))));
@@ -999,7 +1003,7 @@
       const by = grown(handle, now) * (handle.kind === "force" ? perUnit : camera.scale), values = [...now];
       if (!by) return;
       const world = camera.right.map((one, i) => (one * dx - camera.up[i] * dy) / by);
-      handle.components.forEach((axis, i) => { values[handle.first + i] += world[axis]; });
+      for (const [axis, at] of handle.parts) values[at] += world[axis];
       follow(values);
       go(known);
     };

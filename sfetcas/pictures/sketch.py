@@ -50,6 +50,7 @@ __all__ = [
     "rounded",
     "tangents_of",
     "thinned",
+    "turning_of",
     "unit_for",
     "view_of",
     "with_prefix",
@@ -180,11 +181,15 @@ def course_of(
 
 def _samples(step: Configuration, member: str) -> Array:
     """Fractions of the length where a member is drawn: at least 101, a step turning by 0.05 rad at most."""
-    line = step.model.scene.center_lines[member]
+    return np.linspace(0.0, 1.0, 1 + min(20_000, max(100, math.ceil(turning_of(step, member) / 0.05))))
+
+
+def turning_of(step: Configuration, member: str) -> float:
+    """How far the tangent of a member turns along it, rad: deformed, or undeformed where that is more."""
     tangents = tangents_of(step, member, step.model.along(member))
     turned = np.linalg.norm(np.diff(tangents, axis=0), axis=1)
     turning = float((2.0 * np.arcsin(np.clip(0.5 * turned, 0.0, 1.0))).sum())
-    return np.linspace(0.0, 1.0, 1 + min(20_000, max(100, math.ceil(max(turning, line.turning) / 0.05))))
+    return max(turning, step.model.scene.center_lines[member].turning)
 
 
 def tangents_of(step: Configuration, member: str, x: Array, fields: Mapping[str, Array] | None = None) -> Array:
