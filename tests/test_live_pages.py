@@ -11,6 +11,7 @@ import pytest
 
 from sfetcas import Scene, SceneError, load, solve
 from sfetcas.cli import main
+from sfetcas.codegen.timestep import time_step
 from sfetcas.pages import live, page
 from sfetcas.pages.content import content_of
 from sfetcas.parametric.equilibrium import equilibrium_solver
@@ -98,7 +99,7 @@ def test_a_slider_changes_the_answer_as_another_run_does(opened, bend):
     page.settled()
     assert page.window.locator("#number-0").input_value() == "300"
     assert shown(page, "tip") == pytest.approx(bend.steps[0].position("tip").tolist(), abs=error)
-    page.window.get_by_text("as in the scene").click()
+    page.window.get_by_role("button", name="as in the scene").click()
     assert page.window.locator("#number-0").input_value() == "600"
 
 
@@ -216,13 +217,247 @@ def test_the_page_finds_what_the_process_finds(opened, name):
         assert there["results"] == pytest.approx(here.tolist(), abs=1e-12 * np.abs(here).max())
 
 
+# -- motions -----------------------------------------------------------------------------------------------------------
+
+MOTIONS = (
+    "cantilever_plucked",
+    "elbow_force_pulse",
+    "flexible_parallelogram_motion",
+    "pendulum_in_space",
+    "slider_crank_motion",
+    "double_pendulum_rigid",
+    "flying_rod_in_space",
+    "bead_on_circular_wire",
+)
+STEPS = 20
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_the_page_takes_the_steps_of_the_process(opened, name):
+    """With constant arguments, and as the histories of the scene go."""
+    scene = load(PROBLEMS / f"{name}.toml")
+    answer = solve(scene)
+    page = opened(answer, live=True)
+    flexible = {m["name"]: m["x"] for m in content_of(answer)["members"] if m["type"] == "flexible"}
+    own = time_step(scene, "live", places=flexible)
+    defaults, names = own.arguments.defaults, [name for one in own.arguments.arguments for name in one.names]
+    courses = {i: scene.histories[n.split(".")[1]] for i, n in enumerate(names) if n.startswith("histories.")}
+    for given in (0.9 * defaults, None):
+        there = page.run(
+            "([count, values]) => sfetcas.steps(count, values)", [STEPS, None if given is None else given.tolist()]
+        )
+        assert there["status"] == 0
+        state, time = own.begin, 0.0
+        for _ in range(STEPS):
+            values = np.tile(defaults if given is None else given, (len(own.times), 1))
+            for i, course in courses.items() if given is None else ():
+                values[:, i] = course.factor(time + own.usual * own.times)
+            state, time = own.step(state, own.usual, values), time + own.usual
+        here = own.outputs(state, values[-1])
+        assert there["results"] == pytest.approx(here.tolist(), abs=1e-12 * np.abs(here).max())
+        assert told(page).startswith("Time")
+
+
+@pytest.fixture(scope="module")
+def swinging(tmp_path_factory):
+    """A strip whose tip is pushed aside by a force that rises and stays, and its live page."""
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0, "rhoA": 1.0, "damping": 0.05}},
+            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s", "elements": 4}},
+            "histories": {"rise": {"t": [0.0, 0.5], "value": [0.0, 1.0]}},
+            "loads": {"tip": {"type": "force", "node": "B", "value": [0.0, 1.0], "history": "rise"}},
+            "analysis": {"type": "dynamic", "end": 2.0, "step": 0.01},
+        }
+    )
+    answer = solve(scene)
+    return answer, answer.page(tmp_path_factory.mktemp("swinging") / "page.html", live=True)
+
+
+def stopped(page):
+    """Stop the motion."""
+    if page.window.locator("#live-run").inner_text() == "stop":
+        page.window.locator("#live-run").click()
+    page.settled()
+    assert told(page).endswith("stopped")
+
+
+def seconds(page):
+    return float(re.search(r"[Tt]ime ([\d.e+-]+) s", told(page))[1])
+
+
+def test_a_motion_runs_stops_and_begins_anew(opened, swinging):
+    page = opened(*swinging)
+    assert page.run("sfetcas.state()") > 0
+    page.until("document.getElementById('live-status').textContent.match(/[0-9.]+/)[0] > 0.6")
+    stopped(page)
+    first, place = seconds(page), page.run("sfetcas.at({node: 'B'})")
+    # The history of the scene went on by itself, and the tip with it.
+    assert float(page.window.locator("#number-0").input_value()) == 1.0
+    assert place[1] > 0.1
+    page.window.wait_for_timeout(100)
+    assert seconds(page) == first
+    page.window.locator("#live-run").click()
+    page.until(f"document.getElementById('live-status').textContent.match(/[0-9.]+/)[0] > {first}")
+    stopped(page)
+    page.window.get_by_role("button", name="from the beginning").click()
+    page.until("document.getElementById('live-status').textContent.includes('running')")
+    stopped(page)
+    assert seconds(page) < first
+    # States of the answer are looked at meanwhile: what is not seen does not run.
+    page.window.locator("#live-run").click()
+    page.window.locator("#state").fill("0")
+    page.until("document.getElementById('live-run').textContent === 'run'")
+    assert page.run("sfetcas.state()") == 0
+
+
+def test_a_force_is_dragged_while_it_moves(opened, swinging):
+    page = opened(*swinging)
+    page.until("document.getElementById('live-status').textContent.match(/[0-9.]+/)[0] > 0.6")
+    stopped(page)
+    (handle,) = page.run("sfetcas.handles()")
+    origin = page.window.locator("#symbols").bounding_box()
+    page.drag(np.add(handle["tip"], [origin["x"], origin["y"]]), 0, 60)
+    value = float(page.window.locator("#number-2").input_value())
+    # As long as the arrow was, so far it went down.
+    length = np.linalg.norm(np.subtract(np.add(handle["tip"], [origin["x"], origin["y"]]), page.place(node="B")))
+    assert value == pytest.approx(1.0 - 60.0 / length, abs=0.05)
+    before = seconds(page)
+    page.window.locator("#live-run").click()
+    page.until(f"document.getElementById('live-status').textContent.match(/[0-9.]+/)[0] > {before + 0.1}")
+    stopped(page)
+    # A slider of a history takes it over; all goes on as in the scene again.
+    entered(page, 0, 0.25)
+    page.window.locator("#live-run").click()
+    page.window.wait_for_timeout(100)
+    stopped(page)
+    assert float(page.window.locator("#number-0").input_value()) == 0.25
+    page.window.get_by_role("button", name="as in the scene").click()
+    page.window.locator("#live-run").click()
+    page.until("document.getElementById('number-0').value === '1'")
+    assert float(page.window.locator("#number-2").input_value()) == 1.0
+
+
+def test_a_motion_that_cannot_go_on_says_why(opened, swinging):
+    """Here by a load outside of what numbers are."""
+    page = opened(*swinging)
+    stopped(page)
+    entered(page, 2, 1e300)
+    page.window.locator("#live-run").click()
+    page.until("document.getElementById('live-status').textContent.startsWith('Stopped')")
+    assert "no step: Newton's method did not converge" in told(page)
+    assert page.inked() > 0
+    page.window.get_by_role("button", name="from the beginning").click()
+    page.until("document.getElementById('live-status').textContent.endsWith('running')")
+
+
+def test_histories_of_a_motion_are_arguments_anyway(swinging):
+    """The page knows the time, and what a history is then."""
+    scene = swinging[0].scene
+    made = live.live_of(scene, {"m": np.array([0.0, 1.0])}, ["loads.tip.value"])
+    assert [one["name"] for one in made["arguments"]] == ["loads.tip.value", "histories.rise"]
+    assert made["arguments"][1]["spans"] == [[0.0, 1.0]]
+    assert made["histories"]["histories.rise"] == {"t": (0.0, 0.5), "pieces": ((0.0, 1.0),), "value": 0.0}
+
+
+# -- what moves with it ------------------------------------------------------------------------------------------------
+
+
+def rocker(dimension):
+    """A curved rigid arm, hinged on the ground and held by a spring and a strip, that a force turns."""
+    out = [0.0] if dimension == "space" else []
+    axis = {"axis": [0, 0, 1]} if out else {}
+    return Scene.from_dict(
+        {
+            "dimension": dimension,
+            "sections": {"s": {"EI3": 1.0, "EI2": 1.0, "GJ": 1.0} if out else {"EI3": 1.0}},
+            "nodes": {
+                "A": {"position": [0, 0, *out], "support": "hinge", **axis},
+                "B": {"position": [1, 0, *out]},
+                "C": {"position": [2, 0, *out]},
+            },
+            "members": {
+                "arm": {
+                    "type": "rigid",
+                    "nodes": ["A", "B"],
+                    "shape": {"type": "arc", "angle": 2.0, **({"normal": [0, 0, 1]} if out else {})},
+                },
+                "strip": {"nodes": ["B", "C"], "section": "s", "elements": 4},
+            },
+            "springs": {
+                "turn": {"type": "rotational", "node": "A", "stiffness": 2.0},
+                "pull": {"type": "translational", "node": "B", "stiffness": 1.0, "anchor": [1, -1, *out]},
+            },
+            "loads": {"tip": {"type": "force", "node": "C", "value": [0, 1.0, *out]}},
+            "analysis": {"steps": [1.0]},
+        }
+    )
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_rigid_members_and_symbols_move_as_in_an_answer(opened, dimension):
+    scene = rocker(dimension)
+    page = opened(solve(scene), live=True)
+    entered(page, 0, 0.4)
+    there = solve(scene.replace({"analysis.steps": [0.4]}))
+    found = content_of(there)
+    size = scene.size
+    for m, member in enumerate(found["members"]):
+        places = there.last.along(member["name"], np.array(member["x"]))["position"]
+        for sample in (0, len(places) // 3, len(places) // 2, len(places) - 1):
+            assert page.run("(what) => sfetcas.at(what)", {"member": m, "sample": sample}) == pytest.approx(
+                places[sample].tolist(), abs=1e-3 * size
+            )
+    # Springs end where nodes are now, and on the ground where they did.
+    drawn = [
+        np.reshape(one["points"], (-1, 3))
+        for one in page.run("sfetcas.symbols()")
+        if one.get("carriers") == ["B", None]
+    ]
+    zigzag = max(drawn, key=len)
+    assert zigzag[0] == pytest.approx(there.last.position("B"), abs=1e-3 * size)
+    assert zigzag[-1] == pytest.approx([1.0, -1.0, 0.0], abs=1e-3 * size)
+    moment = page.run("sfetcas.symbols()")
+    assert not any(one.get("acts") for one in moment)
+
+
+def test_a_body_that_turns_freely_in_space_is_refused():
+    """Nothing tells how a bow between two balls turns about the line between them."""
+    scene = rocker("space").replace({"members.arm.release": ["ball", "ball"]})
+    results = ["nodes.A.quaternion", "nodes.B.quaternion"]
+    places = {name: np.array([0.0, 0.5, 1.0]) for name in scene.members}
+    assert live._bodies(rocker("space"), places, results)["arm"]["node"] == "A"
+    with pytest.raises(
+        SceneError, match="'arm' that is curved and turns freely at all of its nodes, accepted: straight"
+    ):
+        live._bodies(scene, places, results)
+
+
+def test_a_path_is_followed_beside_its_diagram(opened):
+    """The arch under its crown load: the solver's state is a point of the chart, and it snaps where the path turns."""
+    path = solve(load(PROBLEMS / "arch_120_degrees_crown_load.toml"))
+    limit = min(point.factor for point in path.limit_points if point.factor > 0)
+    page = opened(path, live=True)
+    assert page.window.locator("#panel-live .chart .cursor").get_attribute("visibility") == "visible"
+    before = page.window.locator(".cursor").get_attribute("cy")
+    entered(page, 0, 0.4 * limit)
+    assert told(page).startswith("Solved, residual")
+    assert float(page.window.locator(".cursor").get_attribute("cy")) < float(before)
+    entered(page, 0, 1.1 * limit)
+    assert "snapped" in told(page)
+    slider = page.window.locator("#argument-0")
+    low, high = path.scene.analysis.range
+    assert [float(slider.get_attribute(key)) for key in ("min", "max")] == [low, high]
+
+
 # -- refused -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("name", "words", "sentence"),
     [
-        ("lee_frame", ["--live"], "--live: found the analysis 'path', accepted: 'static'"),
+        ("vibration_helix", ["--live"], "--live: found the analysis 'modes', accepted: 'static', 'path', 'dynamic'"),
         ("bend_45_degrees", ["--argument", "factor"], "--argument: found without effect, accepted: with --live"),
         ("bend_45_degrees", ["--live", "--argument", "loads.up.value"], "loads.up"),
     ],

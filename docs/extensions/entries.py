@@ -1,7 +1,8 @@
-"""What the gallery says of a problem file: solved, compared with what is known of it, and drawn.
+"""What the gallery says of a problem file: solved, compared with what is known of it, drawn, and on a page that turns.
 
 A problem is solved and drawn again only after it, the program or a library has changed; what was made of it is kept in
-``docs/gallery``, where the test of the problems finds it, too.
+``docs/gallery``, where the test of the problems finds it, too.  As a program this makes the entries of all scenes but
+live ones, one after the other.
 """
 
 from __future__ import annotations
@@ -27,14 +28,34 @@ from matplotlib.figure import Figure
 from sfetcas import Scene, load, solve
 from sfetcas.checks import check
 from sfetcas.description.records import say
+from sfetcas.errors import SceneError, SolveError
+from sfetcas.pages.page import page_of
 from sfetcas.reports import report
 
 ROOT = Path(__file__).resolve().parents[2]
 PROBLEMS = ROOT / "problems"
 GALLERY = ROOT / "docs" / "gallery"
 PICTURES = GALLERY / "pictures"
+TURNING = GALLERY / "turning"
 KEPT = GALLERY / "kept"
 DPI = 110
+
+MOST_STATES = 100
+"""Of a path or a motion on a page that turns."""
+
+LIVE = (
+    "arch_120_degrees_crown_load",
+    "bend_45_degrees",
+    "flexible_parallelogram_motion",
+    "lee_frame",
+    "magnetic_gripper",
+    "pendulum_in_space",
+    "slider_crank_motion",
+    "spatial_fourbar",
+    "tendon_finger",
+    "tube_robot",
+)
+"""Scenes whose page has the solver itself."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +85,7 @@ class Entry:
     comparisons: list[Comparison]
     seconds: float
     picture: bool
+    turning: bool = False
 
 
 def problems() -> list[Path]:
@@ -79,7 +101,8 @@ def entry_of(file: Path) -> Entry:
     SceneError, SolveError
         It cannot be solved.
     """
-    PICTURES.mkdir(parents=True, exist_ok=True)
+    for folder in (PICTURES, TURNING):
+        folder.mkdir(parents=True, exist_ok=True)
     return _of_program(file) if file.suffix == ".py" else _of_scene(file)
 
 
@@ -103,16 +126,33 @@ def _of_scene(file: Path) -> Entry:
         for entry in check(scene, answer)
     ]
     _save(answer.plot(), file)
+    _turn(answer, file, file.read_text(encoding="utf-8"), said.getvalue())
     title = scene.title or file.stem
     command = f"sfetcas run problems/{file.name} --plot {file.stem}.png"
+    found = said.getvalue()
     return Entry(
-        file.stem, title, _group(scene), scene.source, "", command, said.getvalue(), comparisons, seconds, picture=True
+        file.stem,
+        title,
+        _group(scene),
+        scene.source,
+        "",
+        command,
+        found,
+        comparisons,
+        seconds,
+        picture=True,
+        turning=True,
     )
 
 
 def _save(figure: Figure, file: Path) -> None:
     figure.savefig(PICTURES / f"{file.stem}.png", dpi=DPI)
     plt.close(figure)
+
+
+def _turn(answer: Any, file: Path, source: str, said: str) -> None:
+    text = page_of(answer, source, said, live=file.stem in LIVE, most=MOST_STATES)
+    (TURNING / f"{file.stem}.html").write_text(text, encoding="utf-8")
 
 
 def _choice(expect: Any) -> Iterator[str]:
@@ -156,10 +196,15 @@ def _of_program(file: Path) -> Entry:
         sizes = {name: entry.default for name, entry in inspect.signature(module.check).parameters.items()}
         taken = inspect.signature(module.picture).parameters
         _save(module.picture(**{name: size for name, size in sizes.items() if name in taken}), file)
+    turning = hasattr(module, "answer")
+    if turning:
+        _turn(module.answer(), file, file.read_text(encoding="utf-8"), "")
     title, _, text = (module.__doc__ or file.stem).partition("\n")
     command = f"python problems/{file.name}"
     return Entry(
-        file.stem, title.rstrip("."), "Programs", "", text.strip(), command, "", comparisons, seconds, picture=drawn
+        *(file.stem, title.rstrip("."), "Programs", "", text.strip(), command, "", comparisons, seconds),
+        picture=drawn,
+        turning=turning,
     )
 
 
@@ -170,7 +215,8 @@ def program_digest() -> str:
     """A digest of the program, of this module, and of the versions of what they are run with."""
     versions = (sys.version, *(importlib.metadata.version(name) for name in ("casadi", "matplotlib", "numpy", "scipy")))
     digest = hashlib.sha256(repr(versions).encode())
-    for file in sorted([*(ROOT / "sfetcas").rglob("*.py"), Path(__file__)]):
+    parts = [one for ending in ("py", "js", "css", "html", "c", "h") for one in (ROOT / "sfetcas").rglob(f"*.{ending}")]
+    for file in sorted([*parts, Path(__file__)]):
         digest.update(file.read_bytes())
     return digest.hexdigest()
 
@@ -183,7 +229,8 @@ def kept(file: Path, program: str) -> Entry | None:
         return None
     comparisons = [Comparison(**comparison) for comparison in found["entry"]["comparisons"]]
     entry = Entry(**{**found["entry"], "comparisons": comparisons})
-    there = not entry.picture or (PICTURES / f"{file.stem}.png").exists()
+    made_of = {PICTURES / f"{file.stem}.png": entry.picture, TURNING / f"{file.stem}.html": entry.turning}
+    there = all(place.exists() for place, wanted in made_of.items() if wanted)
     return entry if found["digest"] == _digest(file, program) and there else None
 
 
@@ -202,3 +249,12 @@ def made(file: Path, program: str) -> Entry:
 
 def _digest(file: Path, program: str) -> str:
     return hashlib.sha256(program.encode() + file.read_bytes()).hexdigest()
+
+
+if __name__ == "__main__":
+    PROGRAM = program_digest()
+    for problem in problems():
+        if problem.suffix == ".toml" and problem.stem not in LIVE:
+            # What is wrong with a problem is for the build to say.
+            with contextlib.suppress(SceneError, SolveError):
+                made(problem, PROGRAM)

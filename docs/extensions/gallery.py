@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+import shutil
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from entries import GALLERY, Entry, made, problems, program_digest
+from entries import GALLERY, LIVE, TURNING, Entry, made, problems, program_digest
 from pages import write_pages
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
@@ -59,6 +60,8 @@ def _page(entry: Entry, file: Path) -> str:
     ]
     if entry.text:
         parts.append(_fenced(entry.text, "{eval-rst}"))
+    if entry.turning:
+        parts.append(_turning(file.stem))
     if entry.picture:
         parts.append(f"![{plain_text(entry.title)}](pictures/{file.stem}.png)\n")
     if entry.source:
@@ -77,6 +80,16 @@ def _page(entry: Entry, file: Path) -> str:
     if entry.found:
         parts += ["## The report\n", _fenced(entry.found)]
     return "\n".join(parts)
+
+
+def _turning(name: str) -> str:
+    """The page that turns in a frame of its own, which is loaded when it comes into view."""
+    look = "width: 100%; height: 480px; border: 1px solid #ccc"
+    how = f'title="{name}" loading="lazy" sandbox="allow-scripts" style="{look}"'
+    frame = f'<iframe src="turning/{name}.html" {how}></iframe>'
+    live = "Drag a slider, or the tip of an arrow: this page solves the scene itself. " if name in LIVE else ""
+    alone = f'<p>{live}<a href="turning/{name}.html">The same on its own.</a></p>'
+    return f"```{{raw}} html\n{frame}\n{alone}\n```\n"
 
 
 def _comparisons(entry: Entry) -> str:
@@ -147,9 +160,15 @@ def _generate(app: Sphinx) -> None:
     pages = {entry.name: _page(entry, file) for entry, file in zip(entries, files, strict=True)}
     pages |= _pages_of_groups(entries)
     write_pages(GALLERY, pages)
-    for page in GALLERY.glob("*.md"):
+    for page in (*GALLERY.glob("*.md"), *TURNING.glob("*.html")):
         if page.stem not in pages:
             page.unlink()
+
+
+def _copy_turning(app: Sphinx, error: Exception | None) -> None:
+    """Put the pages that turn beside those that show them."""
+    if error is None and app.builder.format == "html":
+        shutil.copytree(TURNING, Path(app.outdir) / "gallery" / TURNING.name, dirs_exist_ok=True)
 
 
 _TREES: dict[tuple[Any, ...], str] = {}
@@ -173,6 +192,7 @@ def _share_tree(app: Sphinx, page: str, template: str, context: dict[str, Any], 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Make the pages before Sphinx looks which there are."""
     app.connect("builder-inited", _generate)
+    app.connect("build-finished", _copy_turning)
     # Before the theme does.
     app.connect("html-page-context", _share_tree, priority=400)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

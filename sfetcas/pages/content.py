@@ -23,10 +23,23 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..paths.path import Path
 from ..pictures.colours import QUANTITIES, ColourQuantity
-from ..pictures.glyphs import STANDING, carried_along, sketch_loads, sketch_supports
-from ..pictures.sketch import REACH, TWISTING, Course, Sketch, View, in_short, prefix, turning_of, view_of
+from ..pictures.glyphs import STANDING, sketch_carried, sketch_loads, sketch_supports
+from ..pictures.sketch import (
+    LOAD,
+    MOTION,
+    REACH,
+    REACTION,
+    TWISTING,
+    Course,
+    Sketch,
+    View,
+    in_short,
+    prefix,
+    turning_of,
+    view_of,
+)
 
-__all__ = ["Shown", "content_of"]
+__all__ = ["MOST_STATES", "Shown", "content_of"]
 
 Shown: TypeAlias = Solution | Path | Trajectory | Modes
 """An answer that a page shows."""
@@ -87,7 +100,7 @@ class _Numbers:
         return base64.b64encode(np.ascontiguousarray(values, f"<f{self.bits // 8}").tobytes()).decode()
 
 
-def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any]:
+def content_of(answer: Shown, source: str = "", said: str = "", *, most: int = MOST_STATES) -> dict[str, Any]:
     """All that the viewer needs, as tables, lists, texts and numbers that JSON has.
 
     Parameters
@@ -97,6 +110,8 @@ def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any
         The text of the scene file.
     said : str
         What is said of the answer in short.
+    most : int
+        States of a path or a motion at most, besides critical points and factors that were asked for.
 
     Raises
     ------
@@ -104,7 +119,7 @@ def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any
         The scene has no member that could be seen.
     """
     scene = answer.scene
-    states = list(_states_of(answer, _most_states(answer)))
+    states = list(_states_of(answer, min(most, _room_for(answer))))
     if not scene.members:
         raise SceneError("members: found none, accepted: at least one member that a page can show")
     space = states[-1].step.model.space
@@ -145,6 +160,7 @@ def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any
         "states": [],
         "modes": [] if shapes is None else shapes.packed(numbers),
         "symbols": symbols.known,
+        "inks": {"load": LOAD, "reaction": REACTION, "motion": MOTION},
         "report": said,
         "scene": source,
     }
@@ -167,7 +183,7 @@ def content_of(answer: Shown, source: str = "", said: str = "") -> dict[str, Any
 # -- states ------------------------------------------------------------------------------------------------------------
 
 
-def _most_states(answer: Shown) -> int:
+def _room_for(answer: Shown) -> int:
     """How many states of a path or a motion there is room for."""
     scene = answer.scene
     each = len(scene.members) * FEWEST * (3 + len(DRAWN)) + len(answer.last.model.nodes) * TOLD_LENGTH
@@ -367,6 +383,8 @@ class _Symbols:
         ]
         self._first = replace(self._sketches[0], marks=[], labels=[])
         sketch_supports(self._first)
+        for sketch in self._sketches:
+            sketch.size = self._first.size
         if not moving:
             # Arrows of all states have one scale.
             largest = max(sketch.largest_force for sketch in self._sketches)
@@ -376,8 +394,8 @@ class _Symbols:
     def of(self, number: int) -> dict[str, Any]:
         """Numbers of the symbols of a state, and its labels."""
         sketch = self._sketches[number]
-        sketch_supports(sketch)
-        sketch.marks[:] = carried_along(self._first, sketch)
+        sketch_carried(sketch, self._first)
+        holding = len(sketch.marks)
         if not self._moving:
             sketch_loads(sketch)
         size = sketch.size * self._unit
@@ -390,7 +408,18 @@ class _Symbols:
             }
             for label in sketch.labels
         ]
-        return {"symbols": [self._number(mark, size) for mark in sketch.marks], "labels": labels}
+        numbers = [self._number(mark, size, acts=i >= holding) for i, mark in enumerate(sketch.marks)]
+        return {"symbols": numbers, "labels": labels}
+
+    def _carriers(self, name: str) -> list[str | None]:
+        """Nodes that carry a symbol, with None for the ground; nothing for what goes with the members beside it."""
+        kind, _, record = name.partition("-")
+        if kind == "support":
+            return [record]
+        springs = self._first.scene.springs
+        if kind == "spring" and record in springs and springs[record].type != "rotational":
+            return [springs[record].node, springs[record].to]
+        return []
 
     def _rounded(self, points: Array, size: float) -> list[float | None]:
         """Places (n, 3) in drawn units as a list in metres, with None for what is not a number."""
@@ -398,11 +427,11 @@ class _Symbols:
         values = np.round(np.asarray(points, float).ravel() * self._unit / grid) * grid
         return [float(f"{value:.7g}") if math.isfinite(value) else None for value in values.tolist()]
 
-    def _number(self, mark: Any, size: float) -> int:
-        points = self._rounded(mark.points, size)
+    def _number(self, mark: Any, size: float, *, acts: bool) -> int:
+        points, stands = self._rounded(mark.points, size), mark.name.startswith(STANDING)
+        carriers = [] if acts else self._carriers(mark.name)
         key = (
-            mark.kind,
-            mark.name.startswith(STANDING),
+            *(mark.kind, stands, acts, *carriers),
             mark.colour,
             mark.fill,
             mark.width,
@@ -420,7 +449,9 @@ class _Symbols:
             }
             entry |= {"fill": mark.fill} if mark.kind in ("area", "dot") else {}
             entry |= {"dotted": True} if mark.dotted else {}
-            entry |= {"stands": True} if mark.name.startswith(STANDING) else {}
+            entry |= {"stands": True} if stands else {}
+            entry |= {"acts": True} if acts else {}
+            entry |= {"carriers": carriers} if carriers else {}
             entry |= {"obstacle": True} if mark.name.startswith("contact-") else {}
             self.known.append(entry)
         return self._numbers[key]

@@ -1,4 +1,5 @@
-"""Live pages: the generated solver of a scene as WebAssembly, with what the viewer needs to run it.
+"""Live pages: the generated solver of a scene, or the steps of its motion, as WebAssembly, with what the viewer needs
+to run it.
 
 The same C as of :func:`sfetcas.export`, with a few functions that a page can call.
 """
@@ -9,22 +10,27 @@ import base64
 import importlib.util
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..codegen.folder import export
+from ..codegen.timestep import TimeStep
 from ..description.loads import Load, Motion
 from ..description.records import plain
 from ..description.scene import Scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from ..parametric.arguments import Argument, Asked
+from ..parametric.arguments import FACTOR, Argument, Asked
 from ..parametric.equilibrium import EquilibriumSolver
 
 __all__ = ["check_live", "live_of"]
@@ -34,18 +40,24 @@ NAME = "live"
 GLUE = """#include <string.h>
 #include "live.h"
 static live_memory memory;
-static double arguments[LIVE_ARGUMENTS], results[LIVE_RESULTS], state[LIVE_STATE], kept[LIVE_STATE];
+static double arguments[%s * LIVE_ARGUMENTS + 1], results[LIVE_RESULTS + 1], state[LIVE_STATE + 1];
 static live_report report;
 double *live_arguments(void) { return arguments; }
 double *live_results(void) { return results; }
 live_report *live_report_of(void) { return &report; }
+"""
+
+OF_EQUILIBRIA = """static double kept[LIVE_STATE + 1];
 void live_keep(void) { memcpy(kept, state, sizeof state); }
 void live_back(void) { memcpy(state, kept, sizeof state); }
 int live_solve_now(int warm) { return live_solve(&memory, arguments, state, warm, results, &report); }
 """
 
-EXPORTED = ("live_arguments", "live_results", "live_report_of", "live_keep", "live_back", "live_solve_now")
-"""Functions that a page calls."""
+OF_MOTION = """void live_start(void) { live_begin(state); }
+void live_fresh(void) { live_refresh(state); }
+void live_tell_now(void) { live_tell(&memory, arguments, state, results); }
+int live_step_now(double h) { return live_step_through(&memory, h, arguments, state, results, &report); }
+"""
 
 MISSING = (
     "found no compiler for WebAssembly, accepted: after pip install 'sfetcas[page]', or with the programs clang and "
@@ -56,22 +68,21 @@ SYSROOTS = ("/usr", "/opt/wasi-sysroot", "/opt/wasi-sdk/share/wasi-sysroot")
 """Where a library for WebAssembly may be, beside what WASI_SYSROOT says."""
 
 
+LIVELY = ("static", "path", "dynamic")
+"""Analyses that have live pages; of a path its equilibria are solved."""
+
+
 def check_live(scene: Scene) -> None:
     """Refuse what no live page shows.
 
     Raises
     ------
     SceneError
-        The analysis is not static, a rigid member is curved, or there is no compiler.
+        The analysis is that of modes, or there is no compiler.
     """
     kind = scene.analysis.type
-    if kind != "static":
-        raise SceneError(f"found the analysis {kind!r}, accepted: 'static'", ("live",))
-    for name, member in scene.members.items():
-        if member.type != "flexible" and scene.center_lines[name].turning:
-            raise SceneError(
-                f"found the {member.type} member {name!r} that is curved, accepted: straight ones", ("live",)
-            )
+    if kind not in LIVELY:
+        raise SceneError(f"found the analysis {kind!r}, accepted: {', '.join(map(repr, LIVELY))}", ("live",))
     _compiler()
 
 
@@ -85,35 +96,44 @@ def live_of(
     scene : Scene
     places : mapping of members to fractions (n,) of their length where they are shown
     arguments, settings
-        As of :func:`sfetcas.export`.
+        As of :func:`sfetcas.export`; the histories of a motion are arguments anyway, as the page knows the time.
 
     Returns
     -------
     dict
         ``module``, base64; ``arguments``, ``results`` and ``statuses`` as of the manifest of an export; ``handles``:
         which of the arguments are forces and displacements of nodes that can be dragged; ``factor`` of the scene where
-        that is no argument; ``tangents`` of the undeformed flexible members at their places, by their names.
+        that is no argument; ``tangents`` of the undeformed flexible members at their places, by their names;
+        ``bodies``: the ``rest`` places of members that are curved and do not bend, and the ``node`` they turn with.  Of
+        a motion ``step``, s, the ``times`` within a step at which arguments are needed, and the ``histories`` by the
+        names of their arguments.
 
     Raises
     ------
     SceneError
-        As :func:`sfetcas.export`; there is no compiler, or it fails.  :func:`check_live` has to accept the scene.
+        As :func:`sfetcas.export`; there is no compiler, or it fails; no node tells how a curved rigid member in space
+        turns.  :func:`check_live` has to accept the scene.
     """
     flexible = {name: x for name, x in places.items() if scene.members[name].type == "flexible"}
+    moving = scene.analysis.type == "dynamic"
+    if moving and arguments is not None:
+        spans = dict(arguments) if isinstance(arguments, Mapping) else dict.fromkeys(arguments)
+        arguments = spans | {f"histories.{name}": None for name in scene.histories if f"histories.{name}" not in spans}
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / NAME
         asked = {name: x.tolist() for name, x in flexible.items()}
         made = export(scene, folder, name=NAME, arguments=arguments, places=asked, settings=settings)
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-        (folder / "glue.c").write_text(GLUE, encoding="utf-8")
-        module = _compiled(folder)
-    assert isinstance(made, EquilibriumSolver)
-    spans = {one.name: _spans(one) for one in made.arguments.arguments}
+        glue = GLUE % ("LIVE_TIMES" if moving else "1") + (OF_MOTION if moving else OF_EQUILIBRIA)
+        (folder / "glue.c").write_text(glue, encoding="utf-8")
+        module = _compiled(folder, re.findall(r"(live_\w+)\([^()]*\) \{", glue))
+    assert isinstance(made, EquilibriumSolver | TimeStep)
+    offered = {one.name: _spans(scene, one) for one in made.arguments.arguments}
     tangents = {name: scene.center_lines[name].tangents(x).ravel().tolist() for name, x in flexible.items()}
-    return {
+    found = {
         "module": base64.b64encode(module).decode(),
         "arguments": [
-            {key: one[key] for key in ("name", "unit", "first", "size", "default")} | {"spans": spans[one["name"]]}
+            {key: one[key] for key in ("name", "unit", "first", "size", "default")} | {"spans": offered[one["name"]]}
             for one in manifest["arguments"]
         ],
         "handles": _handles(scene, manifest["arguments"]),
@@ -121,7 +141,33 @@ def live_of(
         "results": [{key: one[key] for key in ("name", "first", "size", "shape")} for one in manifest["results"]],
         "statuses": manifest["statuses"],
         "tangents": tangents,
+        "bodies": _bodies(scene, places, [one["name"] for one in manifest["results"]]),
     }
+    if isinstance(made, TimeStep):
+        histories = {f"histories.{name}": history for name, history in scene.histories.items()}
+        found |= {"step": made.usual, "times": made.times.tolist()}
+        found["histories"] = {
+            name: {"t": history.t, "pieces": history.pieces, "value": history.factor(0.0)}
+            for name, history in histories.items()
+        }
+    return found
+
+
+def _bodies(scene: Scene, places: Mapping[str, Array], results: Sequence[str]) -> dict[str, Any]:
+    """Curved members that are rigid, or nearly so: in the plane they turn as the line between their ends does."""
+    found = {}
+    rotation = "angle" if scene.resolved_dimension == "plane" else "quaternion"
+    for name, member in scene.members.items():
+        line = scene.center_lines[name]
+        if member.type == "flexible" or line.turning == 0.0:
+            continue
+        ends = zip(member.nodes, member.release, strict=True)
+        joined = [node for node, release in ends if release == "rigid" and f"nodes.{node}.{rotation}" in results]
+        if not joined and (rotation == "quaternion" or np.allclose(*line.positions(np.array([0.0, 1.0])))):
+            message = f"found the {member.type} member {name!r} that is curved and turns freely at all of its nodes"
+            raise SceneError(f"{message}, accepted: straight, or rigidly joined to one of them", ("live",))
+        found[name] = {"rest": line.positions(places[name]).ravel().tolist(), "node": next(iter(joined), None)}
+    return found
 
 
 def _handles(scene: Scene, arguments: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -149,7 +195,7 @@ def _handles(scene: Scene, arguments: Sequence[Mapping[str, Any]]) -> list[dict[
             vector = {
                 "kind": kind,
                 "node": acts.node,
-                "grows": acts.history is None,
+                "history": acts.history,
                 "value": plain(value),
                 "parts": [],
             }
@@ -159,12 +205,23 @@ def _handles(scene: Scene, arguments: Sequence[Mapping[str, Any]]) -> list[dict[
     return list(found.values())
 
 
-def _spans(argument: Argument) -> list[list[float]]:
-    """Least and largest value that a page offers of each number of an argument: its range, or up to twice its value."""
+def _spans(scene: Scene, argument: Argument) -> list[list[float]]:
+    """Least and largest value that a page offers of each number of an argument: its range, what a history or a path
+    goes through, or up to twice its value.
+    """
+    table, _, name = argument.name.partition(".")
+    through: list[float] = []
+    if table == "histories" and scene.analysis.type == "dynamic":
+        history = scene.histories[name]
+        through = [history.factor(t) for one in pairwise(history.t) for t in np.linspace(*one, 9).tolist()]
+    elif argument.name == FACTOR and scene.analysis.range:
+        through = list(scene.analysis.range)
     size = max(map(abs, argument.default)) or 1.0
     found = []
     for value, (low, high) in zip(argument.default, argument.limits.tolist(), strict=True):
         usual = (min(0.0, 2.0 * value), max(0.0, 2.0 * value)) if value else (-size, size)
+        if through and min(through) < max(through):
+            usual = min(through), max(through)
         ranged = argument.low is not None and argument.high is not None
         found.append([low, high] if ranged else [max(low, usual[0]), min(high, usual[1])])
     return found
@@ -187,9 +244,9 @@ def _compiler() -> list[str]:
     raise SceneError(MISSING, ("live",))
 
 
-def _compiled(folder: Path) -> bytes:
-    """The module that is made of the C files of a folder."""
-    exports = [f"-Wl,--export={name}" for name in EXPORTED]
+def _compiled(folder: Path, names: Sequence[str]) -> bytes:
+    """The module that is made of the C files of a folder, with functions of these names that a page calls."""
+    exports = [f"-Wl,--export={name}" for name in names]
     words: Sequence[str] = [*_compiler(), "-O2", "-mexec-model=reactor", "-Wl,--strip-all", *exports]
     words = [*words, f"{NAME}.c", "glue.c", "-o", "live.wasm"]
     environment = {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(folder / "cache")}

@@ -19,7 +19,7 @@ from ..errors import SceneError
 from ..files import write_file
 from ..parametric.arguments import Asked
 from ..pictures.files import check_ending
-from .content import Shown, content_of
+from .content import MOST_STATES, Shown, content_of
 from .live import check_live, live_of
 
 __all__ = ["ENDINGS", "View", "page_of", "save_page"]
@@ -27,6 +27,8 @@ __all__ = ["ENDINGS", "View", "page_of", "save_page"]
 PARTS = File(__file__).parent
 HEIGHT = 560
 """Of a page in a notebook, pixels."""
+
+LIVE_PART = "  /* On live pages the text of live.js stands here. */\n"
 
 ENDINGS = (".html", ".htm")
 """Endings of the files that pages are written to."""
@@ -40,6 +42,7 @@ def page_of(
     live: bool = False,
     arguments: Asked = None,
     settings: Settings | None = None,
+    most: int = MOST_STATES,
 ) -> str:
     """The text of a page that shows an answer.
 
@@ -57,6 +60,8 @@ def page_of(
         and all motions.
     settings : Settings, optional
         Accuracy and elements of the solver of a live page.
+    most : int
+        States of a path or a motion at most.
 
     Raises
     ------
@@ -71,7 +76,7 @@ def page_of(
     if source is None:
         source = json.dumps(answer.scene.to_dict(), indent=2, ensure_ascii=False)
     said = repr(answer) if said is None else said
-    found = content_of(answer, source, said)
+    found = content_of(answer, source, said, most=most)
     if live:
         places = {member["name"]: np.array(member["x"]) for member in found["members"]}
         found["live"] = live_of(answer.scene, places, arguments, settings)
@@ -79,7 +84,7 @@ def page_of(
     parts = {
         "title": html.escape(answer.scene.title or "sfetcas"),
         "style": (PARTS / "viewer.css").read_text(encoding="utf-8"),
-        "viewer": (PARTS / "viewer.js").read_text(encoding="utf-8"),
+        "viewer": _viewer(live=live),
         # The solver of a live page is compiled code.
         "wasm": " 'wasm-unsafe-eval'" if live else "",
         # Within a script nothing ends it but "</script", and "<!--" would change how it is read.
@@ -87,6 +92,13 @@ def page_of(
     }
     template = (PARTS / "page.html").read_text(encoding="utf-8")
     return re.sub(r"@(title|style|viewer|wasm|content)@", lambda found: parts[found[1]], template)
+
+
+def _viewer(*, live: bool) -> str:
+    """The script of a page; that of a live one has the part that runs the solver."""
+    text = (PARTS / "viewer.js").read_text(encoding="utf-8")
+    part = (PARTS / "live.js").read_text(encoding="utf-8") if live else ""
+    return text.replace(LIVE_PART, part)
 
 
 def save_page(answer: Shown, file: str | os.PathLike[str], *, live: bool = False, arguments: Asked = None) -> None:

@@ -13,7 +13,7 @@
     sizes: [[0, 190, 200, 212], [0.25, 110, 175, 175], [0.5, 65, 135, 125], [0.75, 120, 95, 40], [1, 150, 40, 20]],
   };
   const PLAIN = [0.122, 0.227, 0.373];
-  const MEMBER = 2.6, NEAR = 12, SMOOTH = 2, LARGEST = 1.6e7, UNFELT = 1e-9, SMALL = 1e-6, MOST_RECORDS = 200, LOST = 1e30;
+  const MEMBER = 2.6, NEAR = 12, ARROW = 80, SMOOTH = 2, LARGEST = 1.6e7, UNFELT = 1e-9, SMALL = 1e-6, MOST_RECORDS = 200, LOST = 1e30;
 
   /** States that are no part of a course. */
   const BESIDE = ["step", "flutter point", "live"];
@@ -240,7 +240,7 @@
   };
 
   const drawMembers = () => {
-    const values = colour ? numbers(states[state].values, colour) || new Float64Array(total) : null;
+    const known = states[state].values, values = colour && known ? numbers(known, colour) || new Float64Array(total) : null;
     const lines = drawn();
     if (!gl) {
       trace(penOf(paper), lines, "#1f3a5f", 2 * MEMBER, values && ((i) => inkOf(0.5 * (values[i] + values[i + 1]))));
@@ -307,7 +307,7 @@
     if (!ranges[key]) {
       let low = Infinity, high = -Infinity;
       for (const one of states) {
-        const values = numbers(one.values, key) || [0];
+        const values = one.values ? numbers(one.values, key) || [0] : [];
         for (const value of values) if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
       }
       if (!(low <= high)) [low, high] = [0, 0];
@@ -421,8 +421,8 @@
     const by = upright ? 1 : states[state].at;
     if (data.gravity && by) {
       const length = Math.abs(by) * Math.hypot(...data.gravity), way = flat(data.gravity).map((x) => (24 * x * by) / length);
-      arrow(pen, [at[0] + 62, at[1] - 8], way, "#d55e00", "");
-      write(pen, `gravity ${short(length)} m/s²`, at[0] + 76, at[1] - 8, "#d55e00", "left");
+      arrow(pen, [at[0] + 62, at[1] - 8], way, data.inks.load, "");
+      write(pen, `gravity ${short(length)} m/s²`, at[0] + 76, at[1] - 8, data.inks.load, "left");
     }
   };
 
@@ -442,7 +442,7 @@
     }
     const here = states[state];
     if ($("show-symbols").checked) {
-      const symbols = here.symbols.map((number) => data.symbols[number]);
+      const symbols = here.symbols.map((one) => (typeof one === "object" ? one : data.symbols[one]));
       for (const symbol of [...symbols].sort((a, b) => a.level - b.level)) drawSymbol(symbol.level <= 1.5 ? back : pen, symbol);
     }
     if ($("show-labels").checked && $("show-symbols").checked) {
@@ -476,7 +476,7 @@
   const drawPicked = (pen) => {
     if (known > 2 && !data.modes.length) {
       pen.setLineDash([1.5, 3]);
-      pen.strokeStyle = "#8f3b76";
+      pen.strokeStyle = data.inks.motion;
       pen.lineWidth = 1.4;
       pen.beginPath();
       states.forEach((one, number) => {
@@ -488,12 +488,12 @@
       pen.setLineDash([]);
     }
     const [x, y] = seen(...placeOf(picked, state));
-    pen.strokeStyle = "#8f3b76";
+    pen.strokeStyle = data.inks.motion;
     pen.lineWidth = 2;
     pen.beginPath();
     pen.arc(x, y, 7, 0, 2 * Math.PI);
     pen.stroke();
-    write(pen, nameOf(picked), x, y - 18, "#8f3b76");
+    write(pen, nameOf(picked), x, y - 18, data.inks.motion);
   };
   const nameOf = (what) => (what.node !== undefined ? what.node : `${members[what.member].name} at ${short(members[what.member].x[what.sample])}`);
 
@@ -574,7 +574,7 @@
       return;
     }
     const found = {};
-    for (const one of quantities) {
+    for (const one of states[state].values ? quantities : []) {
       const values = numbers(states[state].values, one.key);
       found[`${one.label}, ${one.unit}`] = values ? (Number.isFinite(values[i]) ? say(values[i]) : null) : 0;
     }
@@ -604,12 +604,12 @@
     const names = Object.keys(states[0].told.nodes || {});
     for (const name of names) {
       for (let axis = 0; axis < (data.plane ? 2 : 3); axis++) {
-        const values = states.map((one) => one.told.nodes[name].position[axis]);
+        const of = (one) => one.told.nodes[name].position[axis], values = states.map(of);
         const spread = Math.max(...values) - Math.min(...values);
-        if (spread > UNFELT * extent) found.push({ label: `${"xyz"[axis]} of ${name}, m`, values, spread });
+        if (spread > UNFELT * extent) found.push({ label: `${"xyz"[axis]} of ${name}, m`, of, values, spread });
       }
-      const angles = states.map((one) => one.told.nodes[name].angle);
-      if (angles.every((value) => typeof value === "number") && Math.max(...angles) - Math.min(...angles) > UNFELT) found.push({ label: `angle of ${name}, rad`, values: angles, spread: 0 });
+      const of = (one) => one.told.nodes[name].angle, values = states.map(of);
+      if (values.every((value) => typeof value === "number") && Math.max(...values) - Math.min(...values) > UNFELT) found.push({ label: `angle of ${name}, rad`, of, values, spread: 0 });
     }
     return found.sort((a, b) => b.spread - a.spread).slice(0, MOST_RECORDS);
   };
@@ -617,7 +617,7 @@
   const several = states.length > 2 && !data.modes.length && new Set(states.map((one) => one.at)).size > 2;
   const charted = several ? courses() : [];
   // Where nothing moves along a path there is still where it meets what.
-  if (several && !charted.length && data.kind === "path") charted.push({ label: "number of the point", values: states.map((_, i) => i + 1), spread: 0 });
+  if (several && !charted.length && data.kind === "path") charted.push({ label: "number of the point", of: () => NaN, values: states.map((_, i) => i + 1), spread: 0 });
   let chart = null;
 
   const ticks = (low, high) => {
@@ -676,10 +676,13 @@
     });
     const cursor = add("circle", { r: 5.5, fill: "none", stroke: "#d03030", "stroke-width": 2, class: "cursor" });
     const follow = () => {
-      cursor.setAttribute("visibility", state < known ? "visible" : "hidden");
-      if (state >= known) return;
-      cursor.setAttribute("cx", px(x.values[state]));
-      cursor.setAttribute("cy", py(y.values[state]));
+      const here = states[state], value = course.of(here), [cx, cy] = upright ? [here.at, value] : [value, here.at];
+      const within = cx >= xs[0] && cx <= xs[1] && cy >= ys[0] && cy <= ys[1];
+      const place = state < known ? [x.values[state], y.values[state]] : within ? [cx, cy] : null;
+      cursor.setAttribute("visibility", place ? "visible" : "hidden");
+      if (!place) return;
+      cursor.setAttribute("cx", px(place[0]));
+      cursor.setAttribute("cy", py(place[1]));
     };
     const nearest = (event) => {
       const frame = svg.getBoundingClientRect(), cx = ((event.clientX - frame.left) / frame.width) * W, cy = ((event.clientY - frame.top) / frame.height) * H;
@@ -836,213 +839,8 @@
 
   // -- the solver itself ----------------------------------------------------------------------------------------------
 
-  const JUMP = 0.05, PARTS = 8, SNAPS = 4, ARROW = 80;
+  /* On live pages the text of live.js stands here. */
   const live = data.live ? withSolver(data.live) : null;
-
-  /** The solver in the page: it follows its arguments from one equilibrium to the next. */
-  function withSolver(given) {
-    const bytes = Uint8Array.from(atob(given.module), (letter) => letter.charCodeAt(0));
-    const code = new WebAssembly.Instance(new WebAssembly.Module(bytes), {}).exports;
-    if (code._initialize) code._initialize();
-    const size = (list) => list.reduce((sum, one) => Math.max(sum, one.first + one.size), 0);
-    const results = new Float64Array(code.memory.buffer, code.live_results(), size(given.results));
-    const inputs = new Float64Array(code.memory.buffer, code.live_arguments(), size(given.arguments));
-    const report = new DataView(code.memory.buffer, code.live_report_of(), 32);
-    const defaults = new Float64Array(inputs.length);
-    for (const one of given.arguments) defaults.set([].concat(one.default), one.first);
-    const sentences = {}, fields = [], spent = { count: 0, time: 0 };
-    for (const one of Object.values(given.statuses)) sentences[one.value] = one.meaning;
-    // Until something is solved it is as the last state of the answer.
-    const here = { ...states[known - 1], kind: "live", labels: [] };
-    here.symbols = here.symbols.filter((number) => data.symbols[number].stands);
-    let now = null, lines = Float64Array.from(linesOf(known - 1)), snapped = false;
-    states.push(here);
-
-    const solve = (values, warm) => {
-      inputs.set(values);
-      const begin = performance.now(), status = code.live_solve_now(warm ? 1 : 0);
-      spent.time += performance.now() - begin;
-      spent.count += 1;
-      return status;
-    };
-    const holds = (status) => status === 0 || status === 1;
-    const piece = (name) => {
-      const one = given.results.find((found) => found.name === name);
-      return one ? results.slice(one.first, one.first + one.size) : null;
-    };
-    /** Places of all members in the last solution. */
-    const places = () => {
-      const found = new Float64Array(3 * total);
-      members.forEach((member, m) => {
-        const own = piece(`members.${member.name}.position`);
-        if (own) return found.set(own, 3 * starts[m]);
-        const [a, b] = member.nodes.map((node) => piece(`nodes.${node}.position`));
-        member.x.forEach((x, i) => found.set(a.map((one, axis) => (1 - x) * one + x * b[axis]), 3 * (starts[m] + i)));
-      });
-      return found;
-    };
-    const farthest = (a, b) => a.reduce((most, one, i) => Math.max(most, Math.abs(one - b[i])), 0);
-
-    /** Follow the arguments to new values; what jumps between two near ones has snapped. */
-    const follow = (values) => {
-      const from = now, before = lines;
-      snapped = false;
-      if (from) code.live_keep();
-      let status = solve(values, from !== null);
-      if (from && (!holds(status) || farthest(places(), before) > JUMP * extent)) {
-        // Far: by some steps, of which none is much longer than the others, or the structure snaps.
-        code.live_back();
-        const moves = [];
-        let last = before, good = true;
-        for (let k = 1; k <= PARTS && good; k++) {
-          status = solve(values.map((one, i) => from[i] + (k / PARTS) * (one - from[i])), true);
-          good = holds(status);
-          if (!good) break;
-          const next = places();
-          moves.push(farthest(next, last));
-          last = next;
-        }
-        const middle = [...moves].sort((a, b) => a - b)[moves.length >> 1];
-        snapped = good && Math.max(...moves) > Math.max(JUMP * extent, SNAPS * middle);
-        if (!good) {
-          status = solve(values, false);
-          snapped = holds(status);
-        }
-      }
-      if (holds(status)) [now, lines] = [values, places()];
-      else if (from) code.live_back();
-      tell(status, values);
-      return status;
-    };
-
-    const rotated = (q, t) => {
-      const v = q.slice(1), a = cross(v, t).map((one, i) => one + q[0] * t[i]), b = cross(v, a);
-      return t.map((one, i) => one + 2 * b[i]);
-    };
-    /** What members are coloured by, as of the answer. */
-    const sections = () => {
-      const found = Object.fromEntries(quantities.map((one) => [one.key, new Float64Array(total).fill(NaN)]));
-      members.forEach((member, m) => {
-        const [force, moment] = ["force", "moment"].map((key) => piece(`members.${member.name}.${key}`));
-        const rest = given.tangents[member.name], turns = piece(`members.${member.name}.${data.plane ? "angle" : "quaternion"}`);
-        if (!force || !moment || !rest || !turns) return;
-        member.x.forEach((_, i) => {
-          const vector = (list) => [list[3 * i], list[3 * i + 1], list[3 * i + 2]], at = starts[m] + i, t0 = vector(rest);
-          const q = data.plane ? [Math.cos(0.5 * turns[i]), 0, 0, Math.sin(0.5 * turns[i])] : [...turns.slice(4 * i, 4 * i + 4)];
-          const t = rotated(q, t0), f = vector(force), c = vector(moment);
-          const across = (v) => Math.hypot(...v.map((one, k) => one - dot(v, t) * t[k]));
-          const told = {
-            moment: data.plane ? c[2] : across(c), twist: dot(c, t), tension: dot(f, t),
-            shear: data.plane ? f[1] * t[0] - f[0] * t[1] : across(f),
-          };
-          for (const [key, value] of Object.entries(told)) if (found[key]) found[key][at] = value;
-        });
-      });
-      return found;
-    };
-    const tell = (status, values) => {
-      const solved = holds(status), told = { status: sentences[status] };
-      if (solved) {
-        if (snapped) told.snapped = "to an equilibrium that was not near";
-        const negative = report.getInt32(8, true);
-        Object.assign(told, { "ways out": negative < 0 ? "not defined" : negative, residual: report.getFloat64(16, true), "error estimate": report.getFloat64(24, true) });
-        for (const one of given.results) {
-          const [table, record, key] = one.name.split("."), own = [...results.slice(one.first, one.first + one.size)];
-          const value = one.shape.length ? own : own[0];
-          if (table === "members") continue;
-          if (key === undefined) (told[table] ??= Object.create(null))[record] = value;
-          else ((told[table] ??= Object.create(null))[record] ??= {})[key] = value;
-        }
-        here.at = factor ? values[factor.first] : given.factor;
-        here.lines = lines;
-        here.values = sections();
-        for (const key of Object.keys(ranges)) delete ranges[key];
-        here.told = told;
-      } else here.told = { ...here.told, ...told };
-      here.stable = solved ? status === 0 : null;
-      for (const { input, number } of fields) input.value = number.value = Number(values[number.dataset.at].toPrecision(9));
-      const said = solved ? (status === 1 ? "unstable" : snapped ? "solved; it snapped" : "solved") : "no solution";
-      here.text = `live: ${said}`;
-      $("live-status").textContent = solved ? `${said[0].toUpperCase()}${said.slice(1)}, residual ${report.getFloat64(16, true).toExponential(1)}, estimated error ${report.getFloat64(24, true).toExponential(1)}` : `No solution: ${sentences[status]}. What is shown is the last one.`;
-      $("live-status").dataset.status = status;
-      $("live-rate").textContent = `${Math.round((1000 * spent.count) / spent.time)} solves a second`;
-    };
-
-    // Arrows of forces and places of nodes that can be dragged.
-    const factor = given.arguments.find((one) => one.name === "factor");
-    const grown = (handle, values) => (!handle.grows ? 1 : factor ? values[factor.first] : given.factor);
-    const vectorOf = (handle, values, by) => {
-      const found = [...handle.value];
-      for (const [axis, at] of handle.parts) found[axis] = values[at];
-      return found.map((one) => by * one);
-    };
-    const forces = given.handles.filter((one) => one.kind === "force");
-    const largest = Math.max(0, ...forces.map((one) => Math.hypot(...vectorOf(one, defaults, grown(one, defaults)))));
-    const perUnit = ARROW / (largest || 1);
-    const flat = (v) => [dot(camera.right, v), -dot(camera.up, v)];
-    const tip = (handle) => {
-      const at = seen(...here.told.nodes[handle.node].position);
-      if (handle.kind === "place") return [at, at];
-      const way = flat(vectorOf(handle, now, grown(handle, now))).map((one) => one * perUnit);
-      return [at, [at[0] + way[0], at[1] + way[1]]];
-    };
-    const drawHandles = (pen) => {
-      if (!now) return;
-      for (const handle of given.handles) {
-        const [from, to] = tip(handle);
-        if (handle.kind === "force") arrow(pen, from, [to[0] - from[0], to[1] - from[1]], "#d55e00", "");
-        pen.beginPath();
-        pen.arc(...to, 6, 0, 2 * Math.PI);
-        pen.strokeStyle = handle.kind === "force" ? "#d55e00" : "#8f3b76";
-        pen.lineWidth = 1.5;
-        pen.stroke();
-      }
-    };
-    const handleAt = (x, y) => (now && given.handles.find((one) => Math.hypot(...tip(one)[1].map((c, i) => c - [x, y][i])) < NEAR)) || null;
-    const drag = (handle, dx, dy) => {
-      const by = grown(handle, now) * (handle.kind === "force" ? perUnit : camera.scale), values = [...now];
-      if (!by) return;
-      const world = camera.right.map((one, i) => (one * dx - camera.up[i] * dy) / by);
-      for (const [axis, at] of handle.parts) values[at] += world[axis];
-      follow(values);
-      go(known);
-    };
-
-    const panel = addPanel("Live");
-    made("p", "", panel).id = "live-status";
-    for (const one of given.arguments) {
-      one.spans.forEach(([low, high], i) => {
-        const row = made("label", `${one.name}${one.size > 1 ? `, ${i}` : ""}, ${one.unit}`, panel), at = one.first + i;
-        row.className = "argument";
-        const input = made("input", undefined, row), number = made("input", undefined, row);
-        Object.assign(input, { type: "range", min: low, max: high, step: (high - low) / 1000 || 1 });
-        Object.assign(number, { type: "number", step: "any" });
-        input.dataset.at = number.dataset.at = at;
-        input.id = `argument-${at}`;
-        number.id = `number-${at}`;
-        for (const field of [input, number]) {
-          field.addEventListener(field === input ? "input" : "change", () => {
-            const values = [...(now || defaults)];
-            values[at] = Number(field.value);
-            stop();
-            follow(values);
-            go(known);
-          });
-        }
-        fields.push({ input, number });
-      });
-    }
-    const back = made("button", "as in the scene", panel);
-    const forget = () => { now = null; };
-    back.addEventListener("click", () => {
-      forget();
-      follow([...defaults]);
-      go(known);
-    });
-    made("p", "Drag a slider, the tip of a force, or a node that a motion moves: each move is solved from the equilibrium before it.", panel);
-    made("p", "", panel).id = "live-rate";
-    return { begin: () => follow([...defaults]), forget, follow, drawHandles, handleAt, drag, results, tip, handles: given.handles };
-  }
 
   // -- begin ----------------------------------------------------------------------------------------------------------
 
@@ -1065,9 +863,10 @@
   $("show-labels").checked = data.kind === "static";
 
   if (charted.length) {
-    const panel = addPanel("Chart"), holder = made("div", undefined, panel), choice = made("select");
+    // On a live page beside what moves it.
+    const panel = live ? made("section", undefined, $("panel-live")) : addPanel("Chart"), choice = made("select", undefined, panel);
+    const holder = made("div", undefined, panel);
     holder.className = "chart";
-    panel.prepend(choice);
     choice.id = "quantity";
     charted.forEach((one, i) => option(choice, i, one.label));
     choice.addEventListener("change", () => drawChart(holder, Number(choice.value)));
@@ -1113,8 +912,10 @@
   go(state);
   if (data.modes.length) play();
 
-  /** For scripts: where nodes and places are seen, in pixels of the window, and what is shown. */
+  /** For scripts: where nodes and places are seen, in pixels of the window, where they are, m, and what is shown. */
   window.sfetcas = Object.freeze({
+    at: (what) => [...placeOf(what, state)],
+    symbols: () => states[state].symbols.map((one) => (typeof one === "object" ? one : data.symbols[one])),
     seen: (what) => {
       const [x, y] = seen(...placeOf(what, state)), frame = over.getBoundingClientRect();
       return [x + frame.left, y + frame.top];
@@ -1126,6 +927,12 @@
     solve: (values, afresh = false) => {
       if (afresh) live.forget();
       const status = live.follow(values);
+      go(known);
+      return { status, results: [...live.results] };
+    },
+    /** Of a live motion: so many steps from its beginning, with these arguments or those of the scene; as above. */
+    steps: (count, values = null) => {
+      const status = live.steps(count, values);
       go(known);
       return { status, results: [...live.results] };
     },

@@ -26,7 +26,7 @@ from ..errors import SceneError
 from ..paths.path import Path
 from .colours import NONE, ColourQuantity, coloured
 from .files import check_ending, check_folder
-from .glyphs import carried_along, sketch_supports
+from .glyphs import sketch_carried, sketch_supports
 from .modeshapes import PHASES, ModePanels
 from .motions import evenly
 from .sheet import DOTTED, Sheet, add_bar, axes_on, entitle, pieces_of, plot_line
@@ -269,6 +269,7 @@ class _Film(Film):
         self.figure = new_figure(7.0, 5.0, shown=False)
         entitle(self.figure, title)
         self._first = self._sketched(0)
+        sketch_supports(self._first)
         self._paper = self.figure.add_subplot()
         self._paper.set_title(" ", fontsize=9, loc="left")
         axes = axes_on(self.figure, self._paper, self._first)
@@ -308,11 +309,9 @@ class _Film(Film):
         self._pieces.set_array(np.ma.masked_invalid(values / self._unit))
 
     def _sketched(self, number: int) -> Sketch:
-        """What holds the structure at a step."""
+        """An empty sketch of a step."""
         course = replace(self._course, last=self._lines[number], earlier=self._lines)
-        sketch = Sketch(self._scene, self._steps[number], course, self._view)
-        sketch_supports(sketch)
-        return sketch
+        return Sketch(self._scene, self._steps[number], course, self._view)
 
     def show(self, number: int) -> None:
         """Put the structure where it is at a step."""
@@ -330,4 +329,6 @@ class _Film(Film):
 
     def _marks(self, number: int) -> list[Mark]:
         """Marks at a step, of supports those of the first one, carried along."""
-        return carried_along(self._first, self._sketched(number))
+        sketch = self._sketched(number)
+        sketch_carried(sketch, self._first)
+        return sketch.marks

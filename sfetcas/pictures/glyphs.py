@@ -35,7 +35,6 @@ from .sketch import (
     REACTION,
     TENDON,
     Ink,
-    Mark,
     Sketch,
     broken,
     dense,
@@ -45,7 +44,7 @@ from .sketch import (
     tangents_of,
 )
 
-__all__ = ["STANDING", "carried_along", "sketch_all", "sketch_loads", "sketch_supports"]
+__all__ = ["STANDING", "sketch_all", "sketch_carried", "sketch_loads", "sketch_supports"]
 
 ARROW = 0.12
 """Length of the longest arrow over the size of the picture; sizes below are shares of it, too."""
@@ -80,19 +79,15 @@ def sketch_loads(sketch: Sketch) -> None:
     _sketch_tables(sketch, LOADS)
 
 
-def carried_along(first: Sketch, sketch: Sketch) -> list[Mark]:
-    """Marks of a sketch of supports at another state than the first: these as there, only carried along, so that they
-    keep their sides.
+def sketch_carried(sketch: Sketch, first: Sketch) -> None:
+    """Add what :func:`sketch_supports` would: supports and standing obstacles as in the sketch of the first state, only
+    carried along, so that they keep their sides; all else as it is now.
     """
-    carried = {f"contact-{name}" for name, contact in sketch.scene.contacts.items() if contact.node}
     nodes = {f"support-{name}": sketch.at(name) - first.at(name) for name in sketch.scene.nodes}
-
-    def stands(mark: Mark) -> bool:
-        return mark.name.startswith(STANDING) and mark.name not in carried
-
-    moving = [mark for mark in sketch.marks if not stands(mark)]
-    standing = [mark for mark in first.marks if stands(mark)]
-    return [replace(mark, points=mark.points + nodes.get(mark.name, 0.0)) for mark in standing] + moving
+    moved = {f"contact-{name}" for name, contact in sketch.scene.contacts.items() if contact.node}
+    standing = [mark for mark in first.marks if mark.name.startswith(STANDING) and mark.name not in moved]
+    sketch.marks += [replace(mark, points=mark.points + nodes.get(mark.name, 0.0)) for mark in standing]
+    _sketch_tables(sketch, CARRIED)
 
 
 def sketch_supports(sketch: Sketch) -> None:
@@ -159,9 +154,12 @@ def _sketch_contact(sketch: Sketch, name: str, contact: Contact) -> None:
         sketch_obstacle(sketch, name, sketch.step.fields.obstacle(name))
 
 
-def _sketch_node(sketch: Sketch, name: str, node: Node) -> None:
-    """The support of a node, and its joint."""
-    _sketch_support(sketch, name, node)
+def _sketch_moving_contact(sketch: Sketch, name: str, contact: Contact) -> None:
+    if contact.node:
+        _sketch_contact(sketch, name, contact)
+
+
+def _sketch_joint(sketch: Sketch, name: str, node: Node) -> None:
     if node.joint != "rigid":
         sketch.dot(sketch.at(name), f"joint-{name}")
     if node.joint == "universal":
@@ -588,9 +586,8 @@ def _label_place(profile: Array) -> int:
 Glyph = Callable[[Sketch, str, Any], None]
 """Sketches what belongs to a record: (sketch, name, record)."""
 
-SUPPORTS: tuple[tuple[str, Glyph], ...] = (
-    ("contacts", _sketch_contact),
-    ("nodes", _sketch_node),
+MOVING: tuple[tuple[str, Glyph], ...] = (
+    ("nodes", _sketch_joint),
     ("members", _sketch_release),
     ("members", sketch_slots),
     ("springs", _sketch_spring),
@@ -598,7 +595,13 @@ SUPPORTS: tuple[tuple[str, Glyph], ...] = (
     ("tubes", _sketch_tube),
     ("rings", _sketch_ring),
 )
+"""Glyphs of what moves with a structure."""
+
+SUPPORTS: tuple[tuple[str, Glyph], ...] = (("contacts", _sketch_contact), ("nodes", _sketch_support), *MOVING)
 """Glyphs of what holds a structure, by the tables of the scene: all that a new kind of record needs for a picture."""
+
+CARRIED: tuple[tuple[str, Glyph], ...] = (("contacts", _sketch_moving_contact), *MOVING)
+"""Those of which another state than the first needs new marks."""
 
 LOADS: tuple[tuple[str, Glyph], ...] = (
     ("motions", _sketch_motion),
