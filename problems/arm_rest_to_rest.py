@@ -22,7 +22,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sfetcas import CrossSection, History, Ipopt, Load, Member, Node, Scene
+from sfetcas import CrossSection, History, Ipopt, Load, Member, Node, Scene, Trajectory
 from sfetcas.trajectories.controlled_motion import Check, ControlledMotion
 from sfetcas.trajectories.optimal_control import OptimalControl
 from sfetcas.trajectories.replay import Response, respond
@@ -141,6 +141,11 @@ def residual(command: str, elements: int = ELEMENTS, intervals: int = INTERVALS)
 
 
 COMMANDS = ("bang-bang", "smooth", "optimal")
+
+
+def answer(elements: int = ELEMENTS, intervals: int = INTERVALS) -> Trajectory:
+    """The motion under the best torque."""
+    return response("optimal", elements, intervals).trajectory
 
 
 def picture(elements: int = ELEMENTS, intervals: int = INTERVALS) -> Figure:

@@ -25,6 +25,7 @@ from sfetcas import (
     Node,
     OptimalControl,
     Scene,
+    Trajectory,
     motion_functions,
 )
 
@@ -109,6 +110,11 @@ def check() -> dict[str, float]:
         "effort": abs(effort - motion.cost) / motion.cost,
         "way of the tip": float(np.abs(tip - motion.positions("tip")[:, :2]).max()),
     }
+
+
+def answer() -> Trajectory:
+    """The motion under the torques of the collocation."""
+    return by_collocation().replayed().response.trajectory
 
 
 def picture() -> Figure:

@@ -18,7 +18,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sfetcas import Arc, CrossSection, Design, DesignAnswer, Member, Motion, Node, Scene, Table, changed, solve
+from sfetcas import (
+    Arc,
+    CrossSection,
+    Design,
+    DesignAnswer,
+    Member,
+    Motion,
+    Node,
+    Scene,
+    Solution,
+    Table,
+    changed,
+    solve,
+)
 
 AT = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 """Fractions of the length at which the thickness is chosen."""
@@ -95,6 +108,11 @@ def check() -> dict[str, float]:
             0.0, within - 0.05 * ripple(forces(scene(), TRAVELS))
         ),
     }
+
+
+def answer() -> Solution:
+    """The strip that was found, pressed as far as it goes."""
+    return solve(designed().scene(f"{TRAVELS[-1]:g}"))
 
 
 def picture() -> Figure:

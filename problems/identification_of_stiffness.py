@@ -29,6 +29,7 @@ from sfetcas import (
     Member,
     Node,
     Scene,
+    Solution,
     fitting,
     solve,
 )
@@ -178,6 +179,11 @@ def table() -> list[str]:
         lines.append(f"  with second derivatives from {first:.5f} to {last:.5f}")
     share = fit.chi_square / fit.freedom
     return [*lines, f"chi-square over freedom {share:.2f}, more by chance in {100 * (fit.probability or 0.0):.0f} %"]
+
+
+def answer() -> Solution:
+    """The fitted strip under the last force."""
+    return solve(scene(*experiment().estimates.values(), force=FORCES[-1]))
 
 
 def picture() -> Figure:

@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sfetcas import Equilibrium, Prepared, Scene, load, solve, solve_model
+from sfetcas import Equilibrium, Prepared, Scene, Solution, load, solve, solve_model
 
 KINDS = ("rigid", "small", "flexible")
 
@@ -94,6 +94,11 @@ def differences() -> dict[str, np.ndarray]:
 def orders(falling: np.ndarray) -> np.ndarray:
     """Power of 1/stiffness between neighbours."""
     return np.log(falling[:-1] / falling[1:]) / np.log(STIFFER[1] / STIFFER[0])
+
+
+def answer() -> Solution:
+    """The mechanism with flexible links."""
+    return solve(scene())
 
 
 def check() -> dict[str, float]:

@@ -22,7 +22,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sfetcas import History, Ipopt, Scene, load
+from sfetcas import History, Ipopt, Scene, Trajectory, load
 from sfetcas.trajectories.controlled_motion import Check, ControlledMotion
 from sfetcas.trajectories.optimal_control import OptimalControl
 from sfetcas.trajectories.replay import Response, respond
@@ -129,6 +129,11 @@ def check(elements: int = 1, intervals: int = 24) -> dict[str, float]:
 
 
 COMMANDS = (("rigid links", "rigid links"), ("rigid", "flexible, moment of rigid links"), ("found", "flexible, found"))
+
+
+def answer(elements: int = ELEMENTS, intervals: int = INTERVALS) -> Trajectory:
+    """The mechanism under the moment that was found."""
+    return response("found", elements, intervals).trajectory
 
 
 def picture(elements: int = ELEMENTS, intervals: int = INTERVALS) -> Figure:

@@ -21,7 +21,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sfetcas import Analysis, Equilibrium, Load, Scene, load, solve
+from sfetcas import Analysis, Equilibrium, Load, Scene, Solution, load, solve
 
 FOLDER = Path(__file__).parent
 
@@ -117,6 +117,11 @@ def curve(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     turned = [[path.fields(point).rotation(node)[0] for node in ("1", "5")] for point in path.points]
     alpha, beta = np.array(turned).T
     return alpha, beta
+
+
+def answer() -> Solution:
+    """The mechanism with flexible links under the moments."""
+    return solve(flexible().replace({"analysis.steps": MOMENTS}))
 
 
 def picture() -> Figure:

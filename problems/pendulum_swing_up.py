@@ -20,7 +20,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sfetcas import CrossSection, Ipopt, Load, Member, Node, Scene
+from sfetcas import CrossSection, Ipopt, Load, Member, Node, Scene, Trajectory
 from sfetcas.trajectories.controlled_motion import Check, ControlledMotion
 from sfetcas.trajectories.optimal_control import OptimalControl
 
@@ -102,6 +102,11 @@ def check(elements: int = ELEMENTS, intervals: int = INTERVALS) -> dict[str, flo
         # None but 0 or 1.
         "limit above half the moment of the weight": float(LIMIT >= WEIGHT / 2.0),
     }
+
+
+def answer(elements: int = ELEMENTS, intervals: int = INTERVALS) -> Trajectory:
+    """The rod as it swings up."""
+    return replay(elements, intervals).response.trajectory
 
 
 def picture(elements: int = ELEMENTS, intervals: int = INTERVALS) -> Figure:

@@ -24,7 +24,20 @@ import sys
 import numpy as np
 from matplotlib.figure import Figure
 
-from sfetcas import Analysis, Contact, CrossSection, Equilibrium, History, Load, Member, Motion, Node, Scene, solve
+from sfetcas import (
+    Analysis,
+    Contact,
+    CrossSection,
+    Equilibrium,
+    History,
+    Load,
+    Member,
+    Motion,
+    Node,
+    Scene,
+    Solution,
+    solve,
+)
 
 RADIUS, LENGTH, PULL, TURNS, ASIDE = 0.03, 1.0, 20.0, 3.3, 0.5
 """m, m, N, turns, and a small force in the middle, N, that says to which side it snaps."""
@@ -65,9 +78,14 @@ def scene() -> Scene:
 
 
 @functools.cache
-def wound() -> Equilibrium:
+def answer() -> Solution:
     """The rod under its pull, turned."""
-    return solve(scene()).last
+    return solve(scene())
+
+
+def wound() -> Equilibrium:
+    """Its equilibrium."""
+    return answer().last
 
 
 def tangents(member: str, at: np.ndarray) -> np.ndarray:

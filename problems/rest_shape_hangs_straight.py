@@ -17,7 +17,7 @@ import sys
 import numpy as np
 from matplotlib.figure import Figure
 
-from sfetcas import Analysis, CrossSection, Curvature, Design, DesignAnswer, Member, Node, Scene, solve
+from sfetcas import Analysis, CrossSection, Curvature, Design, DesignAnswer, Member, Node, Scene, Solution, solve
 
 LENGTH, EI, WEIGHT, GRAVITY = 1.0, 1.0, 0.2, 9.81
 """m, N m2, N/m, m/s2: a straight strip of these would sink by 2.5 % of its length."""
@@ -61,6 +61,11 @@ def check() -> dict[str, float]:
         "coefficients against the closed form": float(np.abs(found - EXACT).max()),
         "height of the strip by statics": float(np.abs(along[:, 1]).max()),
     }
+
+
+def answer() -> Solution:
+    """The rest shape under its weight."""
+    return solve(designed().scene())
 
 
 def picture() -> Figure:

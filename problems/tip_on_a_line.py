@@ -18,6 +18,7 @@ from sfetcas import (
     Node,
     OpenAnswer,
     Scene,
+    Solution,
     Solver,
     assemble,
     equilibrium_nlp,
@@ -72,6 +73,11 @@ def with_limited_curvature() -> OpenAnswer:
     problem = equilibrium_nlp(assemble(scene(), uniform_mesh(scene(), 4, ELEMENTS)))
     curvature = ca.vertcat(*[problem.curvature("beam", float(at)) for at in np.linspace(0.0, 1.0, 21)])
     return problem.with_row("curvature", curvature, -LIMIT, LIMIT).solve()
+
+
+def answer() -> Solution:
+    """The cantilever that a slider holds on the line."""
+    return solve(with_slider())
 
 
 def check() -> dict[str, float]:

@@ -23,7 +23,7 @@ import sys
 import numpy as np
 from matplotlib.figure import Figure
 
-from sfetcas import Actuation, Analysis, Contact, CrossSection, Equilibrium, Load, Member, Node, Scene, solve
+from sfetcas import Actuation, Analysis, Contact, CrossSection, Equilibrium, Load, Member, Node, Scene, Solution, solve
 from sfetcas.description.shapes import Curvature, end_of
 
 RADII, HALF, PULL, STIFFNESS = (0.04, 0.05), 7.5, 0.5, 1.0
@@ -72,9 +72,14 @@ def scene(radius: float) -> Scene:
 
 
 @functools.cache
-def pulled(radius: float) -> Equilibrium:
+def knot(radius: float) -> Solution:
     """The knot under its pull."""
-    return solve(scene(radius)).last
+    return solve(scene(radius))
+
+
+def pulled(radius: float) -> Equilibrium:
+    """Its equilibrium."""
+    return knot(radius).last
 
 
 def energies(radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -101,6 +106,11 @@ def check() -> dict[str, float]:
         "pull of a loose knot": abs(one + (one - other) * thin / (thick - thin) - 1.0),
         "tension along the rod": float(np.abs((tension + bending) / PULL - 1.0).max()),
     }
+
+
+def answer() -> Solution:
+    """The thicker knot."""
+    return knot(RADII[-1])
 
 
 def picture() -> Figure:

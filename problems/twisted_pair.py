@@ -24,7 +24,20 @@ import sys
 import numpy as np
 from matplotlib.figure import Figure
 
-from sfetcas import Analysis, Contact, CrossSection, Equilibrium, History, Load, Member, Motion, Node, Scene, solve
+from sfetcas import (
+    Analysis,
+    Contact,
+    CrossSection,
+    Equilibrium,
+    History,
+    Load,
+    Member,
+    Motion,
+    Node,
+    Scene,
+    Solution,
+    solve,
+)
 
 RADIUS, LENGTH, PULL, TURN = 0.05, 1.0, 100.0, 6.0
 """m, m, N, rad."""
@@ -61,9 +74,14 @@ def scene() -> Scene:
 
 
 @functools.cache
-def twisted() -> Equilibrium:
+def answer() -> Solution:
     """The pair under its pull, turned."""
-    return solve(scene()).last
+    return solve(scene())
+
+
+def twisted() -> Equilibrium:
+    """Its equilibrium."""
+    return answer().last
 
 
 def torques(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -207,9 +207,7 @@ def _add_page(commands: Commands) -> None:
     )
     _add_file(page)
     page.add_argument("page", type=Path, metavar="OUT.html", help="the page: one file that needs no network")
-    page.add_argument(
-        "--live", action="store_true", help="the page has the solver itself: numbers change on it (statics)"
-    )
+    page.add_argument("--live", action="store_true", help="the page has the solver itself: numbers change on it")
     page.add_argument(
         "--argument",
         action="append",

@@ -14,11 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .checks import check
 from .description.scene import Scene
 from .equilibria.settings import Settings
-from .errors import SceneError
+from .errors import SceneError, Status
 from .files import write_file, write_folder
-from .reports import report
+from .reports import print_checks, report
 
 if TYPE_CHECKING:
     from .tradeoff.trading import Trade
@@ -127,6 +128,8 @@ def outputs_of_page(
     def write(answer: Any, there: Path) -> None:
         with contextlib.redirect_stdout(io.StringIO()) as said:
             report(answer, sum(answer.seconds.values()))
+            if answer.status is Status.SOLVED:
+                print_checks(check(scene, answer))
         how: dict[str, Any] = {"live": options.live, "arguments": arguments, "settings": settings}
         page = page_of(answer, source, said.getvalue(), **how)
         there.write_text(page, encoding="utf-8")

@@ -47,6 +47,10 @@ class Opened:
         """Wait until what has changed is drawn."""
         self.window.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
+    def still(self):
+        """Wait until what moved is drawn as fine as what stands still."""
+        self.until("sfetcas.fine()")
+
     def until(self, code, seconds=20.0):
         """Wait until something holds; the page itself refuses what would watch it there."""
         begin = time.monotonic()
@@ -72,9 +76,11 @@ class Opened:
         mouse.move(begin[0] + dx, begin[1] + dy, steps=4)
         mouse.up()
         self.settled()
+        self.still()
 
     def inked(self):
-        """Number of pixels of members that are drawn."""
+        """Number of pixels of members that are drawn, where nothing moves."""
+        self.still()
         return self._pixels("count")
 
     def inks(self):
@@ -97,8 +103,10 @@ class Opened:
             }}"""
         )
 
-    def picture(self):
-        """What the stage looks like."""
+    def picture(self, moving=False):
+        """What the stage looks like, at once where something moves."""
+        if not moving:
+            self.still()
         return self.window.locator("#stage").screenshot()
 
     def told(self, key, table=0):

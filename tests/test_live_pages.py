@@ -103,6 +103,24 @@ def test_a_slider_changes_the_answer_as_another_run_does(opened, bend):
     assert page.window.locator("#number-0").input_value() == "600"
 
 
+def test_a_notebook_shows_a_live_page_in_a_frame(chromium, bend, tmp_path, monkeypatch):
+    """Also there the solver runs."""
+    answer, made = bend
+    asked = []
+    monkeypatch.setattr(page, "page_of", lambda *given, **how: asked.append(how) or made.read_text(encoding="utf-8"))
+    shown = answer.view(live=True, arguments=["factor"])._repr_html_()
+    assert asked == [{"live": True, "arguments": ["factor"]}]
+    file = tmp_path / "notebook.html"
+    file.write_text(f"<!DOCTYPE html><body>{shown}</body>", encoding="utf-8")
+    window, said = chromium.new_page(), []
+    window.on("console", lambda message: said.append(message.text))
+    window.goto(file.as_uri())
+    status = window.frame_locator("iframe").locator("#live-status")
+    status.filter(has_text="Solved, residual").wait_for()
+    assert said == []
+    window.close()
+
+
 def test_the_tip_of_a_force_is_dragged(opened, bend):
     bend, file = bend
     page = opened(bend, file)

@@ -145,6 +145,25 @@ def test_states_of_a_path_have_the_certificates_of_its_points():
     assert [state["at"] for state in asked] == [entry.factor for entry in path.steps]
 
 
+def test_where_contact_and_strings_change_on_a_path_is_told():
+    path = solve(load(PROBLEMS / "arch_caught_by_a_string.toml"))
+    assert path.transitions
+    states = [state for state in content_of(path)["states"] if state["kind"] == "transition"]
+    assert [state["at"] for state in states] == [one.factor for one in path.transitions]
+    assert [state["told"]["changes"] for state in states] == [list(one.changes) for one in path.transitions]
+
+
+def test_frequencies_along_a_path_are_those_of_its_points():
+    path = solve(load(PROBLEMS / "beck_column_flutter.toml"))
+    states = content_of(path)["states"]
+    points = [state for state in states if state["kind"] not in ("step", "flutter point")]
+    assert len(points) == len(path.points)
+    for state, point in zip(points, path.points, strict=True):
+        assert state["omega"] == pytest.approx(point.omega.tolist(), rel=1e-12)
+    (flutter,) = (state for state in states if state["kind"] == "flutter point")
+    assert flutter["omega"] == (path.flutter_points[0].omega,) * len(points[0]["omega"])
+
+
 def test_long_paths_and_motions_keep_what_was_asked_for(monkeypatch):
     monkeypatch.setattr(content, "MOST_STATES", 12)
     path = solve(load(PROBLEMS / "lee_frame.toml"))
@@ -166,8 +185,12 @@ def test_the_command_writes_a_page_with_report_and_scene(tmp_path, capsys):
     printed = capsys.readouterr().out
     found = held(page.read_text(encoding="utf-8"))
     assert found["scene"] == file.read_text(encoding="utf-8")
-    # But for the time that it took.
-    assert found["report"].splitlines()[:-1] == printed[: printed.index("solved in")].splitlines()
+    # With the comparisons, but for the time that it took.
+    said, shown = (
+        [line for line in text.splitlines() if not line.startswith("solved in")] for text in (found["report"], printed)
+    )
+    assert said == shown
+    assert any(line.split() == ["quantity", "value", "reference", "error", "tolerance"] for line in said)
     assert [one.name for one in tmp_path.iterdir()] == ["bend.html"]
 
 
@@ -188,6 +211,22 @@ node = "B"
 displacement = [1, 0]
 """
 """A member that does not stretch, drawn to twice its length."""
+
+
+@pytest.mark.parametrize(
+    ("gravity", "up"),
+    [((0, -9.81, 0), 1), ((9.81, 0, 0), 0), ((0, 0, 9.81), 2), ((0, 0, -9.81), 2), ((1.0, 1.0, 0.0), 2)],
+)
+def test_gravity_goes_downwards_where_it_is_along_an_axis(bend, gravity, up):
+    view = content._upright(gravity, bend.last.along("bend", np.linspace(0, 1, 9))["position"])
+    down = np.array(gravity if gravity != (1.0, 1.0, 0.0) else [0, 0, -1])
+    assert view.right @ down == pytest.approx(0.0, abs=1e-12)
+    assert view.up @ down < -0.5 * np.linalg.norm(down)
+    assert abs(view.up[up]) > 0.5
+    # Seen from above, not in a mirror.
+    assert np.cross(view.right, view.up) @ down < 0.0
+    assert np.linalg.norm(view.right) == pytest.approx(1.0)
+    assert np.linalg.norm(view.up) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(

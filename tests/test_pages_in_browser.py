@@ -108,6 +108,21 @@ def test_chart_and_structure_move_each_other(opened):
     assert "neutral" in page.window.locator("#panel-answer").inner_text()
 
 
+def test_frequencies_over_the_factor_are_a_chart(opened):
+    """Of Beck's column, which does not move up to the point where it flutters."""
+    path = solve(load(PROBLEMS / "beck_column_flutter.toml"))
+    page = opened(path)
+    choices = page.window.locator("#quantity option").all_inner_texts()
+    assert choices == [f"frequency {k + 1}, rad/s" for k in range(len(path.points[0].omega))]
+    mark = page.window.locator(".chart path").bounding_box()
+    page.window.mouse.click(mark["x"] + 0.5 * mark["width"], mark["y"] + 0.5 * mark["height"])
+    page.settled()
+    cursor = page.window.locator(".cursor").bounding_box()
+    assert cursor["y"] + 0.5 * cursor["height"] == pytest.approx(mark["y"] + 0.5 * mark["height"], abs=4.0)
+    factor = path.flutter_points[0].factor
+    assert page.window.locator("#where").inner_text().startswith(f"factor {factor:.4g}")
+
+
 def test_of_all_equilibria_the_usual_one_is_seen_first(opened):
     page = opened(solve(load(PROBLEMS / "right_angled_frame_three_equilibria.toml")))
     where = page.window.locator("#where")
@@ -124,6 +139,46 @@ def test_what_is_zero_everywhere_has_no_colours(opened):
     assert chosen != "moment"
     assert page.window.locator("#named").inner_text() == "bending moment about z: 0 everywhere"
     assert page.window.locator("#low").inner_text() == page.window.locator("#high").inner_text() == ""
+
+
+def test_gravity_is_an_arrow_that_grows_with_the_factor(opened):
+    """Downwards, and upwards where the factor is below zero."""
+    scene = load(PROBLEMS / "heavy_cantilever_gravity.toml").replace({"analysis.steps": [-0.5, 1.0]})
+    page = opened(solve(scene))
+    inked = """(dy) => {
+        const over = document.getElementById("symbols"), ratio = over.width / over.clientWidth;
+        const [x, y] = [108 * ratio, (over.clientHeight - 70 + dy) * ratio], one = document.createElement("canvas");
+        one.getContext("2d").drawImage(over, -x, -y);
+        const [r, g, b, a] = one.getContext("2d").getImageData(0, 0, 1, 1).data;
+        return a > 128 && r > 180 && g < 140 && b < 60;
+    }"""
+    assert (page.run(inked, 12), page.run(inked, -12)) == (True, False)
+    page.window.locator("#state").fill("0")
+    page.settled()
+    assert (page.run(inked, 12), page.run(inked, -12)) == (False, True)
+
+
+def test_what_moves_slowly_is_drawn_fine_where_it_stands_still(opened, bend):
+    """Of machines that draw less than 30 times a second; here every frame is held up."""
+    page = opened(bend)
+    page.still()
+    size = page.run("document.getElementById('members').width")
+    page.run(
+        """() => new Promise((done) => {
+            let left = 12;
+            const turn = () => {
+                const begin = performance.now();
+                while (performance.now() - begin < 45);
+                document.getElementById("show-rest").click();
+                if (left--) requestAnimationFrame(turn);
+                else done();
+            };
+            turn();
+        })"""
+    )
+    assert page.run("document.getElementById('members').width") == size / 2
+    page.until("sfetcas.fine()")
+    assert page.run("document.getElementById('members').width") == size
 
 
 def test_a_large_window_shows_members_where_they_are(chromium, opened, bend):
@@ -169,9 +224,9 @@ def test_a_motion_plays_and_stops(opened):
 
 def test_modes_move_and_are_chosen(opened):
     page = opened(solve(load(PROBLEMS / "vibration_helix.toml")))
-    moving = page.picture()
+    moving = page.picture(moving=True)
     page.window.wait_for_timeout(150)
-    assert page.picture() != moving
+    assert page.picture(moving=True) != moving
     page.window.locator("#play").click()
     page.settled()
     still = page.picture()

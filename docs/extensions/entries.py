@@ -25,7 +25,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from sfetcas import Scene, load, solve
+from sfetcas import Modes, Scene, load, solve
 from sfetcas.checks import check
 from sfetcas.description.records import say
 from sfetcas.errors import SceneError, SolveError
@@ -40,7 +40,7 @@ TURNING = GALLERY / "turning"
 KEPT = GALLERY / "kept"
 DPI = 110
 
-MOST_STATES = 100
+MOST_STATES = 60
 """Of a path or a motion on a page that turns."""
 
 LIVE = (
@@ -85,7 +85,6 @@ class Entry:
     comparisons: list[Comparison]
     seconds: float
     picture: bool
-    turning: bool = False
 
 
 def problems() -> list[Path]:
@@ -125,7 +124,11 @@ def _of_scene(file: Path) -> Entry:
         )
         for entry in check(scene, answer)
     ]
-    _save(answer.plot(), file)
+    figure = answer.plot()
+    if not isinstance(answer, Modes):
+        # All its parts have their places.
+        figure.set_layout_engine("none")
+    _save(figure, file)
     _turn(answer, file, file.read_text(encoding="utf-8"), said.getvalue())
     title = scene.title or file.stem
     command = f"sfetcas run problems/{file.name} --plot {file.stem}.png"
@@ -141,7 +144,6 @@ def _of_scene(file: Path) -> Entry:
         comparisons,
         seconds,
         picture=True,
-        turning=True,
     )
 
 
@@ -150,7 +152,7 @@ def _save(figure: Figure, file: Path) -> None:
     plt.close(figure)
 
 
-def _turn(answer: Any, file: Path, source: str, said: str) -> None:
+def _turn(answer: Any, file: Path, source: str, said: str | None = None) -> None:
     text = page_of(answer, source, said, live=file.stem in LIVE, most=MOST_STATES)
     (TURNING / f"{file.stem}.html").write_text(text, encoding="utf-8")
 
@@ -190,21 +192,22 @@ def _of_program(file: Path) -> Entry:
         Comparison(name, "", "", float(value), f"{module.TOLERANCE:.1e}", "", bool(value <= module.TOLERANCE))
         for name, value in differences.items()
     ]
+    # Of what was checked, where the size of it is a choice: it is at hand.
+    sizes = {name: entry.default for name, entry in inspect.signature(module.check).parameters.items()}
+
+    def sized(function: Any) -> Any:
+        taken = inspect.signature(function).parameters
+        return function(**{name: size for name, size in sizes.items() if name in taken})
+
     drawn = hasattr(module, "picture")
     if drawn:
-        # Of what was checked, where the size of it is a choice: it is at hand.
-        sizes = {name: entry.default for name, entry in inspect.signature(module.check).parameters.items()}
-        taken = inspect.signature(module.picture).parameters
-        _save(module.picture(**{name: size for name, size in sizes.items() if name in taken}), file)
-    turning = hasattr(module, "answer")
-    if turning:
-        _turn(module.answer(), file, file.read_text(encoding="utf-8"), "")
+        _save(sized(module.picture), file)
+    _turn(sized(module.answer), file, file.read_text(encoding="utf-8"))
     title, _, text = (module.__doc__ or file.stem).partition("\n")
     command = f"python problems/{file.name}"
     return Entry(
         *(file.stem, title.rstrip("."), "Programs", "", text.strip(), command, "", comparisons, seconds),
         picture=drawn,
-        turning=turning,
     )
 
 
@@ -229,8 +232,8 @@ def kept(file: Path, program: str) -> Entry | None:
         return None
     comparisons = [Comparison(**comparison) for comparison in found["entry"]["comparisons"]]
     entry = Entry(**{**found["entry"], "comparisons": comparisons})
-    made_of = {PICTURES / f"{file.stem}.png": entry.picture, TURNING / f"{file.stem}.html": entry.turning}
-    there = all(place.exists() for place, wanted in made_of.items() if wanted)
+    there = (TURNING / f"{file.stem}.html").exists()
+    there = there and (not entry.picture or (PICTURES / f"{file.stem}.png").exists())
     return entry if found["digest"] == _digest(file, program) and there else None
 
 

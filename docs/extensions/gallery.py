@@ -60,8 +60,7 @@ def _page(entry: Entry, file: Path) -> str:
     ]
     if entry.text:
         parts.append(_fenced(entry.text, "{eval-rst}"))
-    if entry.turning:
-        parts.append(_turning(file.stem))
+    parts.append(_turning(file.stem))
     if entry.picture:
         parts.append(f"![{plain_text(entry.title)}](pictures/{file.stem}.png)\n")
     if entry.source:
@@ -150,7 +149,9 @@ def _picture(entry: Entry, width: int) -> str:
 def _generate(app: Sphinx) -> None:
     files, digest = problems(), program_digest()
     with ProcessPoolExecutor() as pool:
-        runs = [pool.submit(_tried, file, digest) for file in files]
+        # Programs take longest: they come first, so that none is waited for at the end.
+        made_first = {file: pool.submit(_tried, file, digest) for file in sorted(files, key=lambda one: one.suffix)}
+        runs = [made_first[file] for file in files]
         shown = status_iterator(runs, "gallery... ", "brown", len(runs), app.verbosity)
         found = [run.result() for run in shown]
     wrong = [entry for entry in found if isinstance(entry, str)]

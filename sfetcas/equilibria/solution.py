@@ -527,7 +527,7 @@ class Viewed:
         ----------
         file : path
         live : bool
-            Whether the page has the solver of the scene: then arguments change on it.  Statics only.
+            Whether the page has the solver of the scene, or takes the steps of its motion: arguments change on it.
         arguments : names of numbers of the scene, or a mapping of them to their ranges (low, high)
             Which: by default the factor, all loads and all motions.
 
@@ -541,11 +541,22 @@ class Viewed:
         save_page(cast("Any", self), file, live=live, arguments=arguments)
         return File(file)
 
-    def view(self) -> View:
-        """The same page for a notebook: it is shown where this is the last value of a cell."""
+    def view(self, *, live: bool = False, arguments: Any = None) -> View:
+        """The same page for a notebook: it is shown where this is the last value of a cell.
+
+        Parameters
+        ----------
+        live, arguments
+            As of :meth:`page`.
+
+        Raises
+        ------
+        SceneError
+            As :meth:`page`.
+        """
         from ..pages.page import View
 
-        return View(cast("Any", self))
+        return View(cast("Any", self), live=live, arguments=arguments)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from ..dynamics.motion import Trajectory
 from ..equilibria.solution import Configuration, Solution
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from ..paths.path import Path
+from ..paths.path import FlutterPoint, Path
 from ..pictures.colours import QUANTITIES, ColourQuantity
 from ..pictures.glyphs import STANDING, sketch_carried, sketch_loads, sketch_supports
 from ..pictures.sketch import (
@@ -87,6 +87,7 @@ class _State:
     branch: int = 0
     kind: str = ""
     stable: bool | str | None = None
+    omega: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ def content_of(answer: Shown, source: str = "", said: str = "", *, most: int = M
     rest = [scene.center_lines[name].positions(x) for name, x in places.items()]
     shapes = _Shapes(answer, places, lines[0]) if isinstance(answer, Modes) else None
     everything = np.vstack([*rest, *(line for one in lines for line in one), *(shapes.farthest if shapes else ())])
-    view = view_of(space, [everything])
+    view = _upright(scene.gravity, everything) if space else view_of(space, [everything])
     symbols = _Symbols(states, lines, rest, view, isinstance(answer, Trajectory))
     found: dict[str, Any] = {
         "title": scene.title,
@@ -171,6 +172,7 @@ def content_of(answer: Shown, source: str = "", said: str = "", *, most: int = M
             "branch": state.branch,
             "kind": state.kind,
             "stable": state.stable,
+            **({"omega": state.omega} if state.omega else {}),
             "lines": numbers.packed(np.vstack(lines[number])),
             "values": _values(state.step, quantities, fields[number], places, numbers),
             "told": state.told,
@@ -178,6 +180,20 @@ def content_of(answer: Shown, source: str = "", said: str = "", *, most: int = M
         }
         found["states"].append(entry)
     return found
+
+
+def _upright(gravity: Sequence[float] | None, points: Array) -> View:
+    """The view in space from which points (n, 3) are seen well, with gravity downwards where it is along an axis."""
+    pull = np.zeros(3) if gravity is None else np.asarray(gravity, float)
+    along = np.flatnonzero(pull)
+    if len(along) != 1 or pull[2] < 0.0:
+        return view_of(True, [points])
+    # Axes whose third is upwards.
+    down = int(along[0])
+    up, first = -np.sign(pull[down]) * np.eye(3)[down], np.eye(3)[(down + 1) % 3]
+    axes = np.stack([first, np.cross(up, first), up])
+    view = view_of(True, [points @ axes.T])
+    return replace(view, right=view.right @ axes, up=view.up @ axes)
 
 
 # -- states ------------------------------------------------------------------------------------------------------------
@@ -216,7 +232,7 @@ def _along_path(path: Path, most: int) -> Iterator[_State]:
     entries = {
         (number, kind): iter(getattr(branch, f"{kind.replace(' ', '_')}s"))
         for number, branch in enumerate(path.branches)
-        for kind in ("limit point", "bifurcation")
+        for kind in ("limit point", "bifurcation", "transition")
     }
     for index, (number, point) in enumerate(every):
         entry = next(entries.get((number, point.kind), iter(())), None)
@@ -226,13 +242,16 @@ def _along_path(path: Path, most: int) -> Iterator[_State]:
         step: Configuration = path.configuration(point)
         told = _without_courses(entry.to_dict()) if entry is not None else _told(step, "reactions")
         text = f"{where}factor {in_short(point.factor)}{', ' if point.kind else ''}{point.kind}"
-        yield _State(text, step, told, number, point.kind, point.stable)
+        omega = () if point.omega is None else tuple(point.omega.tolist())
+        yield _State(text, step, told, number, point.kind, point.stable, omega)
     for number, branch in enumerate(path.branches):
         where = f"branch {number}, " if number else ""
         for kind, entries_of in (("flutter point", branch.flutter_points), ("step", branch.steps)):
             for one in entries_of:
                 text = f"{where}factor {in_short(one.factor)}, {'as asked for' if kind == 'step' else kind}"
-                yield _State(text, one, _without_courses(one.to_dict()), number, kind, one.certificate.stable)
+                known = branch.points[0].omega
+                omega = (one.omega,) * len(known) if isinstance(one, FlutterPoint) and known is not None else ()
+                yield _State(text, one, _without_courses(one.to_dict()), number, kind, one.certificate.stable, omega)
 
 
 def _in_time(motion: Trajectory, most: int) -> Iterator[_State]:

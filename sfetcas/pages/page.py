@@ -120,10 +120,12 @@ class View:
     Parameters
     ----------
     answer : Solution, Path, Trajectory or Modes
+    live, arguments
+        As of :func:`page_of`.
     """
 
-    def __init__(self, answer: Shown) -> None:
-        self.page = page_of(answer)
+    def __init__(self, answer: Shown, *, live: bool = False, arguments: Asked = None) -> None:
+        self.page = page_of(answer, live=live, arguments=arguments)
 
     def _repr_html_(self) -> str:
         """The page in a frame of its own, which knows nothing of the notebook."""

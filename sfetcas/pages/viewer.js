@@ -13,6 +13,7 @@
     sizes: [[0, 190, 200, 212], [0.25, 110, 175, 175], [0.5, 65, 135, 125], [0.75, 120, 95, 40], [1, 150, 40, 20]],
   };
   const PLAIN = [0.122, 0.227, 0.373];
+  const PAUSE = 250, SLOW = 30;
   const MEMBER = 2.6, NEAR = 12, ARROW = 80, SMOOTH = 2, LARGEST = 1.6e7, UNFELT = 1e-9, SMALL = 1e-6, MOST_RECORDS = 200, LOST = 1e30;
 
   /** States that are no part of a course. */
@@ -229,14 +230,18 @@
   };
   const told = (value) => (Number.isFinite(value) ? value : LOST);
 
+  const sent = { lines: null, values: null, count: 0 };
   const paint = (lines, values) => {
-    const [found, count] = segments(lines, values);
-    gl.bufferData(gl.ARRAY_BUFFER, found.subarray(0, 8 * count), gl.DYNAMIC_DRAW);
+    if (sent.lines !== lines || sent.values !== values) {
+      const [found, count] = segments(lines, values);
+      gl.bufferData(gl.ARRAY_BUFFER, found.subarray(0, 8 * count), gl.DYNAMIC_DRAW);
+      Object.assign(sent, { lines, values, count });
+    }
     gl.uniform1f(painter.radius, MEMBER);
     gl.uniform1f(painter.round, data.plane ? 0.4 : 1);
     gl.uniform3fv(painter.plain, PLAIN);
     gl.uniform1i(painter.coloured, values ? 1 : 0);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, sent.count);
   };
 
   const drawMembers = () => {
@@ -499,26 +504,47 @@
 
   // -- drawing --------------------------------------------------------------------------------------------------------
 
-  let waiting = false;
+  let waiting = false, drawnAt = 0, pace = 0, coarse = false, rest = 0;
   const draw = () => {
     if (waiting) return;
     waiting = true;
-    requestAnimationFrame(() => {
+    requestAnimationFrame((stamp) => {
       waiting = false;
+      // What moves all the time, and slowly, is drawn less fine until it stands still.
+      const passed = stamp - drawnAt;
+      pace = passed < PAUSE ? 0.8 * pace + 0.2 * passed : 0;
+      drawnAt = stamp;
+      if (!coarse && pace > SLOW) {
+        coarse = true;
+        sized();
+      }
+      clearTimeout(rest);
+      if (coarse) {
+        rest = setTimeout(() => {
+          [pace, coarse] = [0, false];
+          sized();
+          draw();
+        }, PAUSE);
+      }
       drawMembers();
       drawSymbols();
     });
+  };
+  /** Give the canvases as many pixels as they need. */
+  const sized = () => {
+    for (const canvas of [paper, over, under]) {
+      // Members are drawn finer than they are seen, which makes their edges smooth.
+      const large = size.width * size.height * (SMOOTH * size.ratio) ** 2 > LARGEST;
+      const ratio = size.ratio * (canvas === paper && !large && !coarse ? SMOOTH : 1);
+      const [width, height] = [Math.round(size.width * ratio), Math.round(size.height * ratio)];
+      if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+    }
   };
   const resize = () => {
     const first = size.width === 1, frame = $("stage").getBoundingClientRect();
     const before = Math.min(size.width, size.height);
     [size.width, size.height, size.ratio] = [Math.max(frame.width, 1), Math.max(frame.height, 1), window.devicePixelRatio || 1];
-    for (const canvas of [paper, over, under]) {
-      // Members are drawn finer than they are seen, which makes their edges smooth.
-      const large = size.width * size.height * (SMOOTH * size.ratio) ** 2 > LARGEST;
-      const ratio = size.ratio * (canvas === paper && !large ? SMOOTH : 1);
-      [canvas.width, canvas.height] = [Math.round(size.width * ratio), Math.round(size.height * ratio)];
-    }
+    sized();
     if (first) fit();
     else camera.scale *= Math.min(size.width, size.height) / before;
     draw();
@@ -611,7 +637,12 @@
       const of = (one) => one.told.nodes[name].angle, values = states.map(of);
       if (values.every((value) => typeof value === "number") && Math.max(...values) - Math.min(...values) > UNFELT) found.push({ label: `angle of ${name}, rad`, of, values, spread: 0 });
     }
-    return found.sort((a, b) => b.spread - a.spread).slice(0, MOST_RECORDS);
+    const most = Math.max(...states.map((one) => (one.omega || []).length));
+    const frequencies = Array.from({ length: most }, (_, k) => {
+      const of = (one) => (one.omega ? one.omega[k] : NaN);
+      return { label: `frequency ${k + 1}, rad/s`, of, values: states.map(of), spread: 0 };
+    });
+    return [...frequencies, ...found.sort((a, b) => b.spread - a.spread).slice(0, MOST_RECORDS)];
   };
   const known = states.length;
   const several = states.length > 2 && !data.modes.length && new Set(states.map((one) => one.at)).size > 2;
@@ -640,7 +671,7 @@
       return found;
     };
     const span = (values) => {
-      const low = Math.min(...values), high = Math.max(...values), margin = 0.04 * (high - low) || Math.abs(high) || 1;
+      const finite = values.filter(Number.isFinite), low = Math.min(...finite), high = Math.max(...finite), margin = 0.04 * (high - low) || Math.abs(high) || 1;
       return [low - margin, high + margin];
     };
     const [xs, ys] = [span(x.values), span(y.values)];
@@ -657,19 +688,22 @@
     }
     add("text", { x: 0.5 * (edge.left + W - edge.right), y: H - 6, "text-anchor": "middle", ...font }, x.label);
     add("text", { x: 11, y: 0.5 * (edge.top + H - edge.bottom), "text-anchor": "middle", transform: `rotate(-90 11 ${0.5 * (edge.top + H - edge.bottom)})`, ...font }, y.label);
+    const told = (i) => Number.isFinite(x.values[i]) && Number.isFinite(y.values[i]);
     // Between load steps nothing is known.
     const along = x.values.map((_, i) => i).filter((i) => data.kind !== "static" && !BESIDE.includes(states[i].kind));
     for (let k = 0; k + 1 < along.length; k++) {
       const [i, j] = [along[k], along[k + 1]];
-      if (states[i].branch !== states[j].branch) continue;
+      if (states[i].branch !== states[j].branch || !told(i) || !told(j)) continue;
       const unstable = states[j].stable === false || states[i].stable === false;
       const line = add("line", { x1: px(x.values[i]), y1: py(y.values[i]), x2: px(x.values[j]), y2: py(y.values[j]), stroke: INKS[states[i].branch % INKS.length], "stroke-width": 1.6, "stroke-linecap": "round" });
       if (unstable) line.setAttribute("stroke-dasharray", "3 3");
     }
     states.slice(0, known).forEach((one, i) => {
+      if (!told(i)) return;
       const at = { stroke: INKS[one.branch % INKS.length], fill: "#fff", "stroke-width": 1.4 };
       const mark = one.kind === "bifurcation" ? add("rect", { x: px(x.values[i]) - 4, y: py(y.values[i]) - 4, width: 8, height: 8, ...at })
         : one.kind === "limit point" ? add("circle", { cx: px(x.values[i]), cy: py(y.values[i]), r: 4.2, ...at })
+          : one.kind === "transition" ? add("path", { d: `M${px(x.values[i])},${py(y.values[i]) - 5}l5,5l-5,5l-5,-5z`, ...at })
           : one.kind === "flutter point" ? add("path", { d: `M${px(x.values[i])},${py(y.values[i]) - 5}l5,9h-10z`, ...at })
           : one.kind === "step" || data.kind === "static" ? add("circle", { cx: px(x.values[i]), cy: py(y.values[i]), r: 2.2, ...at }) : null;
       if (mark) mark.append(Object.assign(document.createElementNS(NS, "title"), { textContent: one.text }));
@@ -678,7 +712,7 @@
     const follow = () => {
       const here = states[state], value = course.of(here), [cx, cy] = upright ? [here.at, value] : [value, here.at];
       const within = cx >= xs[0] && cx <= xs[1] && cy >= ys[0] && cy <= ys[1];
-      const place = state < known ? [x.values[state], y.values[state]] : within ? [cx, cy] : null;
+      const place = state < known ? (told(state) ? [x.values[state], y.values[state]] : null) : within ? [cx, cy] : null;
       cursor.setAttribute("visibility", place ? "visible" : "hidden");
       if (!place) return;
       cursor.setAttribute("cx", px(place[0]));
@@ -686,7 +720,7 @@
     };
     const nearest = (event) => {
       const frame = svg.getBoundingClientRect(), cx = ((event.clientX - frame.left) / frame.width) * W, cy = ((event.clientY - frame.top) / frame.height) * H;
-      const off = x.values.map((_, i) => (upright ? Math.abs(px(x.values[i]) - cx) : Math.hypot(px(x.values[i]) - cx, py(y.values[i]) - cy)));
+      const off = x.values.map((_, i) => (!told(i) ? Infinity : upright ? Math.abs(px(x.values[i]) - cx) : Math.hypot(px(x.values[i]) - cx, py(y.values[i]) - cy)));
       return off.indexOf(Math.min(...off));
     };
     svg.addEventListener("pointerdown", (event) => {
@@ -871,7 +905,7 @@
     charted.forEach((one, i) => option(choice, i, one.label));
     choice.addEventListener("change", () => drawChart(holder, Number(choice.value)));
     drawChart(holder, 0);
-    const marks = data.kind === "path" ? "Solid: stable, dashed: unstable; circles: limit points, squares: bifurcations, triangles: flutter points, dots: factors asked for. " : "";
+    const marks = data.kind === "path" ? "Solid: stable, dashed: unstable; circles: limit points, squares: bifurcations, triangles: flutter points, diamonds: where contact, stops or strings change, dots: factors asked for. " : "";
     made("p", `${marks}Click or drag: the structure follows.`, panel);
   }
   if (live) live.begin();
@@ -923,6 +957,7 @@
     state: () => state,
     picked: () => picked,
     webgl: Boolean(gl),
+    fine: () => !coarse && !waiting,
     /** Of a live page: solve with these arguments, from the undeformed structure where `afresh`; status and results. */
     solve: (values, afresh = false) => {
       if (afresh) live.forget();
