@@ -230,11 +230,14 @@ def kept(file: Path, program: str) -> Entry | None:
         found = json.loads((KEPT / f"{file.name}.json").read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
+    # What another program has made may have other keys.
+    if found["digest"] != _digest(file, program):
+        return None
     comparisons = [Comparison(**comparison) for comparison in found["entry"]["comparisons"]]
     entry = Entry(**{**found["entry"], "comparisons": comparisons})
     there = (TURNING / f"{file.stem}.html").exists()
     there = there and (not entry.picture or (PICTURES / f"{file.stem}.png").exists())
-    return entry if found["digest"] == _digest(file, program) and there else None
+    return entry if there else None
 
 
 def made(file: Path, program: str) -> Entry:

@@ -124,10 +124,13 @@ def _pages_of_groups(entries: list[Entry]) -> dict[str, str]:
         drawn = [entry for entry in chosen if entry.picture]
         shown = " | ".join(_picture(entry, 200) for entry in drawn[:: max(1, len(drawn) // WIDE)][:WIDE])
         rows.append(f"| [{group}]({page}.md), {len(chosen)} | {shown} |")
+    live = [f"[{plain_text(entry.title)}]({entry.name}.md)" for entry in entries if entry.name in LIVE]
     text = (
         "# Gallery\n\nEach file of `problems/` has a page: its picture, the file, what is expected and from where, and "
-        "what is found. The pages are made with the documentation; the build fails if a value is missed.\n"
+        "what is found. The pages are made with the documentation; the build fails if a value is missed.\n\n"
+        "In each page the answer is turned, played and picked from in a frame."
     )
+    text += f" Some frames have the solver itself, which solves while you drag: {', '.join(live)}.\n" if live else "\n"
     listed = "\n".join(pages)
     table = "\n".join(["|" + " |" * (1 + WIDE), "|" + "---|" * (1 + WIDE), *rows])
     return {**pages, "index": f"{text}\n{table}\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"}

@@ -6,7 +6,7 @@
   const { states, members, quantities } = data;
   const UNITS = {
     position: "m", angle: "rad", velocity: "m/s", angular_velocity: "rad/s", force: "N", moment: "N m", energy: "J",
-    gap: "m", tension: "N", length: "m", torque: "N m", friction: "N", omega: "rad/s", mass: "kg",
+    gap: "m", tension: "N", length: "m", torque: "N m", friction: "N", omega: "rad/s", mass: "kg", time: "s",
   };
   const COLOURS = {
     signed: [[0, 33, 80, 160], [0.25, 103, 153, 205], [0.5, 205, 205, 205], [0.75, 228, 135, 105], [1, 172, 30, 40]],
@@ -245,6 +245,7 @@
   };
 
   const drawMembers = () => {
+    $("legend").hidden = !colour || !states[state].values;
     const known = states[state].values, values = colour && known ? numbers(known, colour) || new Float64Array(total) : null;
     const lines = drawn();
     if (!gl) {
@@ -325,7 +326,6 @@
   };
   const setColour = (key) => {
     colour = key;
-    $("legend").hidden = !key;
     if (key) {
       const one = quantities.find((found) => found.key === key), stops = COLOURS[one.signed ? "signed" : "sizes"];
       pixels = new Uint8ClampedArray(4 * 256);
