@@ -199,25 +199,6 @@ def test_a_support_is_dragged(opened):
     assert told(page).startswith("Solved")
 
 
-def test_a_snap_is_told(opened):
-    """An arch whose crown is pressed down beyond its limit load."""
-    path = solve(load(PROBLEMS / "arch_120_degrees_crown_load.toml"))
-    limit = min(point.factor for point in path.limit_points if point.factor > 0)
-    scene = path.scene.replace(analysis={"type": "static", "steps": [0.5 * limit], "accuracy": 1e-5})
-    page = opened(solve(scene), live=True, arguments={"factor": (0.0, 3.0 * limit)})
-    entered(page, 0, 0.7 * limit)
-    assert told(page).startswith("Solved, residual")
-    entered(page, 0, 1.4 * limit)
-    assert "snapped" in told(page)
-    entered(page, 0, 1.41 * limit)
-    assert told(page).startswith("Solved, residual")
-    # Beyond its range there is no solution: what is shown stays.
-    where = page.place(member=0, sample=5)
-    entered(page, 0, 4.0 * limit)
-    assert told(page).startswith("No solution: an argument")
-    assert page.place(member=0, sample=5) == where
-
-
 @pytest.mark.parametrize("name", SCENES)
 def test_the_page_finds_what_the_process_finds(opened, name):
     scene = load(PROBLEMS / f"{name}.toml")
@@ -237,7 +218,26 @@ def test_the_page_finds_what_the_process_finds(opened, name):
 
 # -- motions -----------------------------------------------------------------------------------------------------------
 
+
+@pytest.fixture(scope="module")
+def swinging(tmp_path_factory):
+    """A strip whose tip is pushed aside by a force that rises and stays, and its live page."""
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0, "rhoA": 1.0, "damping": 0.05}},
+            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s", "elements": 4}},
+            "histories": {"rise": {"t": [0.0, 0.5], "value": [0.0, 1.0]}},
+            "loads": {"tip": {"type": "force", "node": "B", "value": [0.0, 1.0], "history": "rise"}},
+            "analysis": {"type": "dynamic", "end": 2.0, "step": 0.01},
+        }
+    )
+    answer = solve(scene)
+    return answer, answer.page(tmp_path_factory.mktemp("swinging") / "page.html", live=True)
+
+
 MOTIONS = (
+    "swinging",
     "cantilever_plucked",
     "elbow_force_pulse",
     "flexible_parallelogram_motion",
@@ -251,11 +251,10 @@ STEPS = 20
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-def test_the_page_takes_the_steps_of_the_process(opened, name):
+def test_the_page_takes_the_steps_of_the_process(opened, swinging, name):
     """With constant arguments, and as the histories of the scene go."""
-    scene = load(PROBLEMS / f"{name}.toml")
-    answer = solve(scene)
-    page = opened(answer, live=True)
+    answer, file = swinging if name == "swinging" else (solve(load(PROBLEMS / f"{name}.toml")), None)
+    scene, page = answer.scene, opened(answer, file, live=True)
     flexible = {m["name"]: m["x"] for m in content_of(answer)["members"] if m["type"] == "flexible"}
     own = time_step(scene, "live", places=flexible)
     defaults, names = own.arguments.defaults, [name for one in own.arguments.arguments for name in one.names]
@@ -274,23 +273,6 @@ def test_the_page_takes_the_steps_of_the_process(opened, name):
         here = own.outputs(state, values[-1])
         assert there["results"] == pytest.approx(here.tolist(), abs=1e-12 * np.abs(here).max())
         assert told(page).startswith("Time")
-
-
-@pytest.fixture(scope="module")
-def swinging(tmp_path_factory):
-    """A strip whose tip is pushed aside by a force that rises and stays, and its live page."""
-    scene = Scene.from_dict(
-        {
-            "sections": {"s": {"EI3": 1.0, "rhoA": 1.0, "damping": 0.05}},
-            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
-            "members": {"m": {"nodes": ["A", "B"], "section": "s", "elements": 4}},
-            "histories": {"rise": {"t": [0.0, 0.5], "value": [0.0, 1.0]}},
-            "loads": {"tip": {"type": "force", "node": "B", "value": [0.0, 1.0], "history": "rise"}},
-            "analysis": {"type": "dynamic", "end": 2.0, "step": 0.01},
-        }
-    )
-    answer = solve(scene)
-    return answer, answer.page(tmp_path_factory.mktemp("swinging") / "page.html", live=True)
 
 
 def stopped(page):
@@ -370,9 +352,10 @@ def test_a_motion_that_cannot_go_on_says_why(opened, swinging):
     page.until("document.getElementById('live-status').textContent.endsWith('running')")
 
 
-def test_histories_of_a_motion_are_arguments_anyway(swinging):
+def test_histories_of_a_motion_are_arguments_anyway(monkeypatch, swinging):
     """The page knows the time, and what a history is then."""
     scene = swinging[0].scene
+    monkeypatch.setattr(live, "_compiled", lambda folder, names: b"")
     made = live.live_of(scene, {"m": np.array([0.0, 1.0])}, ["loads.tip.value"])
     assert [one["name"] for one in made["arguments"]] == ["loads.tip.value", "histories.rise"]
     assert made["arguments"][1]["spans"] == [[0.0, 1.0]]
@@ -452,21 +435,51 @@ def test_a_body_that_turns_freely_in_space_is_refused():
         live._bodies(scene, places, results)
 
 
-def test_a_path_is_followed_beside_its_diagram(opened):
-    """The arch under its crown load: the solver's state is a point of the chart, and it snaps where the path turns."""
+@pytest.fixture(scope="module")
+def arch(tmp_path_factory):
+    """The path of an arch that is pressed down at its crown, its limit load, and a live page up to three times that."""
     path = solve(load(PROBLEMS / "arch_120_degrees_crown_load.toml"))
     limit = min(point.factor for point in path.limit_points if point.factor > 0)
-    page = opened(path, live=True)
+    file = tmp_path_factory.mktemp("arch") / "page.html"
+    return path, limit, path.page(file, live=True, arguments={"factor": (0.0, 3.0 * limit)})
+
+
+def test_a_path_is_followed_beside_its_diagram(opened, arch):
+    """What the solver finds is a point of the chart."""
+    path, limit, file = arch
+    page = opened(path, file)
     assert page.window.locator("#panel-live .chart .cursor").get_attribute("visibility") == "visible"
     before = page.window.locator(".cursor").get_attribute("cy")
     entered(page, 0, 0.4 * limit)
     assert told(page).startswith("Solved, residual")
     assert float(page.window.locator(".cursor").get_attribute("cy")) < float(before)
-    entered(page, 0, 1.1 * limit)
+
+
+def test_a_snap_is_told(opened, arch):
+    """Beyond the limit load."""
+    path, limit, file = arch
+    page = opened(path, file)
+    entered(page, 0, 0.4 * limit)
+    assert told(page).startswith("Solved, residual")
+    entered(page, 0, 1.4 * limit)
     assert "snapped" in told(page)
-    slider = page.window.locator("#argument-0")
-    low, high = path.scene.analysis.range
-    assert [float(slider.get_attribute(key)) for key in ("min", "max")] == [low, high]
+    entered(page, 0, 1.41 * limit)
+    assert told(page).startswith("Solved, residual")
+    # Beyond its range there is no solution: what is shown stays.
+    where = page.place(member=0, sample=5)
+    entered(page, 0, 4.0 * limit)
+    assert told(page).startswith("No solution: an argument")
+    assert page.place(member=0, sample=5) == where
+
+
+def test_the_slider_of_a_factor_goes_along_the_path(monkeypatch):
+    """And begins on it, where the loads' own factor, 1, is not."""
+    monkeypatch.setattr(live, "_compiled", lambda folder, names: b"")
+    scene = load(PROBLEMS / "arch_120_degrees_crown_load.toml")
+    for low, high in (scene.analysis.range, (0.0, 0.5)):
+        found = live.live_of(scene.replace({"analysis.range": [low, high]}), {}, ["factor"])["arguments"][0]
+        assert found["spans"] == [[low, high]]
+        assert found["default"] == min(1.0, high)
 
 
 # -- refused -----------------------------------------------------------------------------------------------------------

@@ -402,8 +402,9 @@ class _Symbols:
         ]
         self._first = replace(self._sketches[0], marks=[], labels=[])
         sketch_supports(self._first)
+        # One frame shows all states, in which arrows keep their sides.
         for sketch in self._sketches:
-            sketch.size = self._first.size
+            sketch.size, sketch.sides = self._first.size, self._first.sides
         if not moving:
             # Arrows of all states have one scale.
             largest = max(sketch.largest_force for sketch in self._sketches)

@@ -132,7 +132,9 @@ def live_of(
     if scene.analysis.range:
         # A path need not come to the factor of its loads.
         for one in manifest["arguments"]:
-            one["default"] = np.clip(one["default"], *scene.analysis.range).item() if one["name"] == FACTOR else one["default"]
+            one["default"] = (
+                np.clip(one["default"], *scene.analysis.range).item() if one["name"] == FACTOR else one["default"]
+            )
     tangents = {name: scene.center_lines[name].tangents(x).ravel().tolist() for name, x in flexible.items()}
     found = {
         "module": base64.b64encode(module).decode(),

@@ -441,20 +441,27 @@ def _sketch_reaction(sketch: Sketch, name: str, node: Node) -> None:
 
 def _sketch_pushes(sketch: Sketch, name: str, contact: Contact) -> None:
     """What an obstacle pushes with."""
-    for member, at, force in sketch.step.pushes(name):
+    for number, (member, at, force) in enumerate(sketch.step.pushes(name)):
         if norm(force) > tolerances.NEGLIGIBLE * sketch.largest_force:
             point = sketch.along(member, np.array([at]))[0]
-            _sketch_force(sketch, point, force, Ink(f"push-{name}", REACTION, 1.1), pushing=True)
+            _sketch_force(sketch, point, force, Ink(f"push-{name}", REACTION, 1.1), number, pushing=True)
 
 
-def _sketch_force(sketch: Sketch, point: Array, value: Array, ink: Ink, *, pushing: bool = False) -> None:
-    """An arrow that starts at the point or, ``pushing``, ends there; the other way round where that hides less."""
+def _sketch_force(
+    sketch: Sketch, point: Array, value: Array, ink: Ink, number: int = 0, *, pushing: bool = False
+) -> None:
+    """An arrow that starts at the point or, ``pushing``, ends there; the other way round where that hides less, or
+    where the one of this name and number did.
+    """
     direction = value / norm(value)
     length = ARROW * max(0.45, norm(value) / sketch.largest_force) * sketch.size
     pulled = point + np.outer([0.012 * sketch.size, length], direction)
     pushed = pulled - (length + 0.012 * sketch.size) * direction
     ways = [(pushed, 0), (pulled, 1)] if pushing else [(pulled, 1), (pushed, 0)]
-    points, free = min(ways, key=lambda way: _hidden(sketch, way[0], point))
+    if (ink.name, number) not in sketch.sides:
+        hidden = [_hidden(sketch, way, point) for way, _ in ways]
+        sketch.sides[ink.name, number] = hidden.index(min(hidden))
+    points, free = ways[sketch.sides[ink.name, number]]
     sketch.arrow(points, ink)
     away = flat_unit(sketch.view.flat(points[free] - point) / length, (0.0, 1.0))
     sketch.write_value(norm(value), "N", points[free], away, ink)

@@ -298,7 +298,10 @@ class Label:
 
 @dataclass(eq=False)
 class Sketch:
-    """Marks and labels of one equilibrium, and what they must not hide."""
+    """Marks and labels of one equilibrium, and what they must not hide.
+
+    ``sides`` are those that arrows have chosen, by name and number: shared by several states they stay.
+    """
 
     scene: Scene
     step: Configuration
@@ -306,6 +309,7 @@ class Sketch:
     view: View
     marks: list[Mark] = field(default_factory=list)
     labels: list[Label] = field(default_factory=list)
+    sides: dict[tuple[str, int], int] = field(default_factory=dict)
 
     @functools.cached_property
     def size(self) -> float:
