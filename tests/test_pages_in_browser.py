@@ -124,7 +124,7 @@ def test_frequencies_over_the_factor_are_a_chart(opened):
 
 
 def test_of_all_equilibria_the_usual_one_is_seen_first(opened):
-    page = opened(solve(load(PROBLEMS / "right_angled_frame_three_equilibria.toml")))
+    page = opened(solve(load(PROBLEMS / "cantilever_inclined_force_all_equilibria.toml")))
     where = page.window.locator("#where")
     assert page.run("sfetcas.state()") == 0 or "equilibrium 1 of" in where.inner_text()
     assert "unstable" not in where.inner_text()
