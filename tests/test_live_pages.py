@@ -348,6 +348,12 @@ def test_a_motion_that_cannot_go_on_says_why(opened, swinging):
     page.until("document.getElementById('live-status').textContent.startsWith('Stopped')")
     assert "no step: Newton's method did not converge" in told(page)
     assert page.inked() > 0
+    # Where the load is another it goes on.
+    entered(page, 2, 0.5)
+    page.window.locator("#live-run").click()
+    page.until("document.getElementById('live-status').textContent.endsWith('running')")
+    entered(page, 2, 1e300)
+    page.until("document.getElementById('live-status').textContent.startsWith('Stopped')")
     page.window.get_by_role("button", name="from the beginning").click()
     page.until("document.getElementById('live-status').textContent.endsWith('running')")
 

@@ -40,17 +40,17 @@
     };
     const holding = answer.symbols.map((number) => data.symbols[number]).filter((symbol) => !symbol.acts);
     const carried = holding.map((symbol) => {
-      const count = symbol.points.length / 3, at = (k) => symbol.points.slice(3 * k, 3 * k + 3);
+      const vertices = symbol.points.length / 3, at = (k) => symbol.points.slice(3 * k, 3 * k + 3);
       if (symbol.stands && !symbol.carriers) return () => symbol;
       const moved = (node) => (node === null ? [0, 0, 0] : here.told.nodes[node].position.map((one, axis) => one - answer.told.nodes[node].position[axis]));
       const put = (place) => {
         const points = [];
-        for (let k = 0; k < count; k++) points.push(...(symbol.points[3 * k] === null ? [null, null, null] : place(k)));
+        for (let k = 0; k < vertices; k++) points.push(...(symbol.points[3 * k] === null ? [null, null, null] : place(k)));
         return { ...symbol, points };
       };
       if (symbol.carriers) {
         // A spring stretches from its node to the other end; what is not drawn from the node on is on the ground.
-        const [node, other = node] = symbol.carriers, begin = answer.told.nodes[node].position, [first, last] = [at(0), at(count - 1)];
+        const [node, other = node] = symbol.carriers, begin = answer.told.nodes[node].position, [first, last] = [at(0), at(vertices - 1)];
         const way = last.map((one, axis) => one - first[axis]), square = dot(way, way) || 1;
         const drawn = Math.hypot(...first.map((one, axis) => one - begin[axis])) < 1e-3 * extent;
         const share = (k) => (other === node ? 0 : drawn ? Math.min(Math.max(dot(at(k).map((one, axis) => one - first[axis]), way) / square, 0), 1) : 1);
@@ -59,7 +59,7 @@
           return put((k) => at(k).map((one, axis) => one + (1 - share(k)) * a[axis] + share(k) * b[axis]));
         };
       }
-      const near = Array.from({ length: count }, (_, k) => beside(at(k)));
+      const near = Array.from({ length: vertices }, (_, k) => beside(at(k)));
       return () => put((k) => {
         const i = near[k], t0 = tangent(answered, i), t1 = tangent(lines, i), w = cross(t0, t1), c = 1 + dot(t0, t1);
         const arm = at(k).map((one, axis) => one - answered[3 * i + axis]), a = cross(w, arm), b = cross(w, a);
@@ -75,8 +75,9 @@
       spent.count += 1;
       return status;
     };
+    const named = new Map(given.results.map((one) => [one.name, one]));
     const piece = (name) => {
-      const one = given.results.find((found) => found.name === name);
+      const one = named.get(name);
       return one ? results.slice(one.first, one.first + one.size) : null;
     };
     /** Places of all members in the last solution. */
@@ -86,12 +87,9 @@
         const own = piece(`members.${member.name}.position`);
         if (own) return found.set(own, 3 * starts[m]);
         const [a, b] = [member.nodes[0], member.nodes.at(-1)].map((node) => piece(`nodes.${node}.position`)), body = given.bodies[member.name];
-        const turned = body ? asBody(body, a, b) : null;
-        member.x.forEach((x, i) => {
-          // What is turned meets one end, and the other up to what the member bends.
-          const at = turned ? turned(i) : a, gap = turned ? b.map((one, axis) => one - turned(member.x.length - 1)[axis]) : b.map((one, axis) => one - a[axis]);
-          found.set(at.map((one, axis) => one + x * gap[axis]), 3 * (starts[m] + i));
-        });
+        const turned = body ? asBody(body, a, b) : () => a, end = turned(member.x.length - 1);
+        // What is turned meets one end, and the other up to what the member bends.
+        member.x.forEach((x, i) => found.set(turned(i).map((one, axis) => one + x * (b[axis] - end[axis])), 3 * (starts[m] + i)));
       });
       return found;
     };
@@ -130,7 +128,7 @@
       $("live-status").dataset.status = status;
     };
     const rate = (what) => {
-      $("live-rate").textContent = spent.count ? `${Math.round((1000 * spent.count) / spent.time)} ${what} a second` : "";
+      $("live-rate").textContent = spent.time > 0 ? `${Math.round((1000 * spent.count) / spent.time)} ${what} a second` : "";
     };
 
     // -- equilibria ---------------------------------------------------------------------------------------------------
@@ -288,6 +286,8 @@
       const run = () => {
         const mine = (running = performance.now());
         let before = mine;
+        // Where it stopped it is tried again.
+        status = DONE;
         $("live-run").textContent = "stop";
         const span = states[last].at - states[0].at, pace = (span > 0 ? span : data.seconds) / data.seconds;
         const tick = (stamp) => {
@@ -393,7 +393,7 @@
     };
     const drawHandles = (pen) => {
       if (!solver.now()) return;
-      for (const [node, { force }] of Object.entries(here.told.reactions || {})) {
+      for (const [node, { force }] of Object.entries(($("show-symbols").checked && here.told.reactions) || {})) {
         const at = seen(...here.told.nodes[node].position), way = force ? flat([...force]).map((one) => one * perUnit) : [0, 0];
         if (Math.hypot(...way) > 2) arrow(pen, at.map((one, i) => one - way[i]), way, data.inks.reaction, "");
       }
