@@ -382,8 +382,8 @@
     };
     const forces = given.handles.filter((one) => one.kind === "force");
     const pushes = Object.values(answer.told.reactions || {}).map((one) => Math.hypot(...(one.force || [0])));
-    const largest = Math.max(0, ...pushes, ...forces.map((one) => Math.hypot(...vectorOf(one, defaults, grown(one, defaults) || 1))));
-    const perUnit = ARROW / (largest || 1);
+    const largest = Math.max(0, ...forces.map((one) => Math.hypot(...vectorOf(one, defaults, grown(one, defaults) || 1))));
+    const perUnit = ARROW / (largest || Math.max(0, ...pushes) || 1);
     const flat = (v) => [dot(camera.right, v), -dot(camera.up, v)];
     const tip = (handle) => {
       const at = seen(...here.told.nodes[handle.node].position);
@@ -394,7 +394,9 @@
     const drawHandles = (pen) => {
       if (!solver.now()) return;
       for (const [node, { force }] of Object.entries(($("show-symbols").checked && here.told.reactions) || {})) {
-        const at = seen(...here.told.nodes[node].position), way = force ? flat([...force]).map((one) => one * perUnit) : [0, 0];
+        const at = seen(...here.told.nodes[node].position), push = Math.hypot(...(force || [0]));
+        // What is much larger than the loads would go through everything.
+        const way = force && push ? flat([...force]).map((one) => one * Math.min(perUnit, (1.5 * ARROW) / push)) : [0, 0];
         if (Math.hypot(...way) > 2) arrow(pen, at.map((one, i) => one - way[i]), way, data.inks.reaction, "");
       }
       for (const handle of given.handles) {
