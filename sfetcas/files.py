@@ -84,7 +84,7 @@ def write_file(path: Path, writer: Callable[[Path], Any]) -> None:
     Raises
     ------
     SceneError
-        The file could not be written.
+        The file could not be written, or what the writer raises.
     """
     name = ""
     try:
@@ -95,6 +95,9 @@ def write_file(path: Path, writer: Callable[[Path], Any]) -> None:
         writer(Path(name))
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
+    except SceneError:
+        # What is written, not where.
+        raise
     except (OSError, ValueError, ArithmeticError) as error:
         raise SceneError(f"{path}: could not be written: {error}") from None
     finally:
@@ -115,7 +118,7 @@ def write_folder(path: Path, writer: Callable[[Path], Any]) -> None:
     Raises
     ------
     SceneError
-        The folder could not be written.
+        The folder could not be written, or what the writer raises.
     """
     try:
         with tempfile.TemporaryDirectory(dir=path.parent) as place:
@@ -128,6 +131,9 @@ def write_folder(path: Path, writer: Callable[[Path], Any]) -> None:
             finally:
                 if old.exists() and not path.exists():
                     os.replace(old, path)
+    except SceneError:
+        # What is written, not where.
+        raise
     except (OSError, ValueError, ArithmeticError) as error:
         raise SceneError(f"{path}: could not be written: {error}") from None
 

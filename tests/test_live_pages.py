@@ -99,6 +99,10 @@ def test_a_slider_changes_the_answer_as_another_run_does(opened, bend):
     page.settled()
     assert page.window.locator("#number-0").input_value() == "300"
     assert shown(page, "tip") == pytest.approx(bend.steps[0].position("tip").tolist(), abs=error)
+    # The scale of the colours grows with what is coloured.
+    shown_before = float(page.window.locator("#high").inner_text())
+    entered(page, 0, 3000.0)
+    assert float(page.window.locator("#high").inner_text()) > 1.2 * shown_before
     page.window.get_by_role("button", name="as in the scene").click()
     assert page.window.locator("#number-0").input_value() == "600"
 
@@ -339,6 +343,55 @@ def test_a_force_is_dragged_while_it_moves(opened, swinging):
     assert float(page.window.locator("#number-2").input_value()) == 1.0
 
 
+def test_numbers_are_typed_while_a_motion_runs(opened, swinging):
+    page = opened(*swinging)
+    field = page.window.locator("#number-2")
+    field.click()
+    page.window.keyboard.press("Control+A")
+    page.window.keyboard.type("0.25", delay=60)
+    assert field.input_value() == "0.25"
+    page.window.keyboard.press("Enter")
+    page.settled()
+    assert field.input_value() == "0.25"
+    before = seconds(page)
+    # What is no number changes nothing.
+    field.fill("")
+    field.press("Enter")
+    page.until("document.getElementById('number-2').value === '0.25'")
+    # Recorded states that are played make way.
+    page.window.locator("#play").click()
+    page.until("document.getElementById('live-run').textContent === 'run'")
+    page.window.locator("#live-run").click()
+    page.until(f"document.getElementById('live-status').textContent.match(/[0-9.]+/)[0] > {before + 0.05}")
+    assert page.window.locator("#live-run").inner_text() == "stop"
+
+
+def test_a_node_that_a_history_moves_is_given_back(opened):
+    """From where a slider has put it, without a jump."""
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
+            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s", "elements": 3}},
+            "histories": {"h": {"t": [0, 1, 2, 4], "value": [0, 1, 0, 0], "interpolation": "spline"}},
+            "motions": {
+                "up": {"node": "A", "displacement": [0, 0.5], "history": "h"},
+                "turn": {"node": "A", "rotation": 0.5, "history": "h"},
+            },
+            "analysis": {"type": "dynamic", "end": 1.0, "step": 0.01},
+        }
+    )
+    page = opened(solve(scene), live=True)
+    page.window.locator("#live-speed").select_option("4")
+    page.until("document.getElementById('live-status').textContent.match(/[0-9.]+/)[0] > 4.1")
+    entered(page, 0, 0.3)
+    page.until("Math.abs(sfetcas.at({node: 'A'})[1] - 0.15) < 1e-9")
+    page.window.get_by_role("button", name="as in the scene").click()
+    page.until("Math.abs(sfetcas.at({node: 'A'})[1]) < 1e-9")
+    stopped(page)
+    assert page.window.locator("#number-0").input_value() == "0"
+
+
 def test_a_motion_that_cannot_go_on_says_why(opened, swinging):
     """Here by a load outside of what numbers are."""
     page = opened(*swinging)
@@ -416,17 +469,25 @@ def test_rigid_members_and_symbols_move_as_in_an_answer(opened, dimension):
             assert page.run("(what) => sfetcas.at(what)", {"member": m, "sample": sample}) == pytest.approx(
                 places[sample].tolist(), abs=1e-3 * size
             )
+
     # Springs end where nodes are now, and on the ground where they did.
-    drawn = [
-        np.reshape(one["points"], (-1, 3))
-        for one in page.run("sfetcas.symbols()")
-        if one.get("carriers") == ["B", None]
-    ]
-    zigzag = max(drawn, key=len)
-    assert zigzag[0] == pytest.approx(there.last.position("B"), abs=1e-3 * size)
-    assert zigzag[-1] == pytest.approx([1.0, -1.0, 0.0], abs=1e-3 * size)
-    moment = page.run("sfetcas.symbols()")
-    assert not any(one.get("acts") for one in moment)
+    def zigzag():
+        drawn = [one["points"] for one in page.run("sfetcas.symbols()") if one.get("carriers") == ["B", None]]
+        return np.reshape(max(drawn, key=lambda points: None not in points), (-1, 3)).astype(float)
+
+    spring = zigzag()
+    assert spring[0] == pytest.approx(there.last.position("B"), abs=1e-3 * size)
+    assert spring[-1] == pytest.approx([1.0, -1.0, 0.0], abs=1e-3 * size)
+    assert not any(one.get("acts") for one in page.run("sfetcas.symbols()"))
+
+    def width(points):
+        along = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
+        across = points - points[0] - np.outer((points - points[0]) @ along, along)
+        return np.linalg.norm(across, axis=1).max()
+
+    # Also where the spring has turned and stretched it is as wide as in the answer.
+    entered(page, 0, -1.0)
+    assert width(zigzag()) == pytest.approx(width(spring), rel=1e-3)
 
 
 def test_a_body_that_turns_freely_in_space_is_refused():
@@ -448,6 +509,16 @@ def arch(tmp_path_factory):
     limit = min(point.factor for point in path.limit_points if point.factor > 0)
     file = tmp_path_factory.mktemp("arch") / "page.html"
     return path, limit, path.page(file, live=True, arguments={"factor": (0.0, 3.0 * limit)})
+
+
+def test_names_that_objects_have_are_names(opened):
+    """Of rigid members, which pages look up by their names."""
+    scene = rocker("plane").to_dict()
+    scene["members"] = {"constructor": scene["members"]["arm"], "__proto__x": scene["members"]["strip"]}
+    scene["nodes"]["D"] = {"position": [2.5, 0]}
+    scene["members"]["toString"] = {"type": "rigid", "nodes": ["C", "D"]}
+    page = opened(solve(Scene.from_dict(scene)), live=True)
+    assert told(page).startswith("Solved, residual")
 
 
 def test_a_path_is_followed_beside_its_diagram(opened, arch):
@@ -495,6 +566,11 @@ def test_the_slider_of_a_factor_goes_along_the_path(monkeypatch):
     ("name", "words", "sentence"),
     [
         ("vibration_helix", ["--live"], "--live: found the analysis 'modes', accepted: 'static', 'path', 'dynamic'"),
+        (
+            "ball_bounces",
+            ["--live"],
+            "sfetcas: analysis.integrator: found 'radau-3' with contact, accepted for C: stepping",
+        ),
         ("bend_45_degrees", ["--argument", "factor"], "--argument: found without effect, accepted: with --live"),
         ("bend_45_degrees", ["--live", "--argument", "loads.up.value"], "loads.up"),
     ],

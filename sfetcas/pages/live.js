@@ -24,11 +24,23 @@
 
     // -- symbols, carried from where they are in the answer -----------------------------------------------------------
 
+    const minus = (a, b) => a.map((one, axis) => one - b[axis]);
+    const unitOf = (way) => {
+      const length = Math.hypot(...way) || 1;
+      return way.map((one) => one / length);
+    };
+    /** The smallest rotation from a unit vector to another, as a function of vectors. */
+    const turning = (from, to) => {
+      const w = cross(from, to), c = 1 + dot(from, to);
+      return (arm) => {
+        const a = cross(w, arm), b = cross(w, a);
+        return arm.map((one, axis) => (c < SMALL ? -one : one + a[axis] + b[axis] / c));
+      };
+    };
     const memberAt = members.flatMap((member, m) => member.x.map(() => m));
     const tangent = (line, i) => {
       const m = memberAt[i], [a, b] = [Math.max(i - 1, starts[m]), Math.min(i + 1, starts[m + 1] - 1)];
-      const way = [0, 1, 2].map((axis) => line[3 * b + axis] - line[3 * a + axis]), length = Math.hypot(...way) || 1;
-      return way.map((one) => one / length);
+      return unitOf([0, 1, 2].map((axis) => line[3 * b + axis] - line[3 * a + axis]));
     };
     const beside = ([x, y, z]) => {
       let least = Infinity, found = 0;
@@ -49,21 +61,26 @@
         return { ...symbol, points };
       };
       if (symbol.carriers) {
-        // A spring stretches from its node to the other end; what is not drawn from the node on is on the ground.
         const [node, other = node] = symbol.carriers, begin = answer.told.nodes[node].position, [first, last] = [at(0), at(vertices - 1)];
-        const way = last.map((one, axis) => one - first[axis]), square = dot(way, way) || 1;
-        const drawn = Math.hypot(...first.map((one, axis) => one - begin[axis])) < 1e-3 * extent;
-        const share = (k) => (other === node ? 0 : drawn ? Math.min(Math.max(dot(at(k).map((one, axis) => one - first[axis]), way) / square, 0), 1) : 1);
+        const shifted = (place, by) => place.map((one, axis) => one + by[axis]);
+        if (other === node) return () => put((k) => shifted(at(k), moved(node)));
+        // What is not drawn from the node on is on the ground.
+        if (Math.hypot(...minus(first, begin)) > 1e-3 * extent) return () => put((k) => shifted(at(k), moved(other)));
+        // A spring stretches and turns with the line between its ends, and is as wide as before.
+        const way = minus(last, first), share = (k) => dot(minus(at(k), first), way) / dot(way, way);
         return () => {
-          const [a, b] = [moved(node), moved(other)];
-          return put((k) => at(k).map((one, axis) => one + (1 - share(k)) * a[axis] + share(k) * b[axis]));
+          const start = shifted(first, moved(node)), line = minus(shifted(last, moved(other)), start);
+          const turned = turning(unitOf(way), unitOf(line));
+          return put((k) => {
+            const part = share(k), aside = turned(at(k).map((one, axis) => one - first[axis] - part * way[axis]));
+            return start.map((one, axis) => one + part * line[axis] + aside[axis]);
+          });
         };
       }
       const near = Array.from({ length: vertices }, (_, k) => beside(at(k)));
       return () => put((k) => {
-        const i = near[k], t0 = tangent(answered, i), t1 = tangent(lines, i), w = cross(t0, t1), c = 1 + dot(t0, t1);
-        const arm = at(k).map((one, axis) => one - answered[3 * i + axis]), a = cross(w, arm), b = cross(w, a);
-        return arm.map((one, axis) => lines[3 * i + axis] + (c < SMALL ? -one : one + a[axis] + b[axis] / c));
+        const i = near[k], arm = at(k).map((one, axis) => one - answered[3 * i + axis]);
+        return turning(tangent(answered, i), tangent(lines, i))(arm).map((one, axis) => one + lines[3 * i + axis]);
       });
     });
     const carry = () => { here.symbols = carried.map((one) => one()); };
@@ -75,6 +92,7 @@
       spent.count += 1;
       return status;
     };
+    const ownOf = (table, name) => (Object.hasOwn(table, name) ? table[name] : null);
     const named = new Map(given.results.map((one) => [one.name, one]));
     const piece = (name) => {
       const one = named.get(name);
@@ -86,7 +104,7 @@
       members.forEach((member, m) => {
         const own = piece(`members.${member.name}.position`);
         if (own) return found.set(own, 3 * starts[m]);
-        const [a, b] = [member.nodes[0], member.nodes.at(-1)].map((node) => piece(`nodes.${node}.position`)), body = given.bodies[member.name];
+        const [a, b] = [member.nodes[0], member.nodes.at(-1)].map((node) => piece(`nodes.${node}.position`)), body = ownOf(given.bodies, member.name);
         const turned = body ? asBody(body, a, b) : () => a, end = turned(member.x.length - 1);
         // What is turned meets one end, and the other up to what the member bends.
         member.x.forEach((x, i) => found.set(turned(i).map((one, axis) => one + x * (b[axis] - end[axis])), 3 * (starts[m] + i)));
@@ -119,8 +137,9 @@
     };
     const showFields = (values) => {
       for (const { input, number } of fields) {
-        const value = Number(values[number.dataset.at].toPrecision(9));
-        for (const field of [input, number]) if (field !== document.activeElement || field.value !== String(value)) field.value = value;
+        input.value = values[number.dataset.at];
+        // What is being typed is not written over.
+        if (!number.dataset.typed) number.value = Number(values[number.dataset.at].toPrecision(9));
       }
     };
     const say = (text, status) => {
@@ -179,7 +198,7 @@
         const found = Object.fromEntries(quantities.map((one) => [one.key, new Float64Array(total).fill(NaN)]));
         members.forEach((member, m) => {
           const [force, moment] = ["force", "moment"].map((key) => piece(`members.${member.name}.${key}`));
-          const rest = given.tangents[member.name], turns = piece(`members.${member.name}.${data.plane ? "angle" : "quaternion"}`);
+          const rest = ownOf(given.tangents, member.name), turns = piece(`members.${member.name}.${data.plane ? "angle" : "quaternion"}`);
           if (!force || !moment || !rest || !turns) return;
           member.x.forEach((_, i) => {
             const vector = (list) => [list[3 * i], list[3 * i + 1], list[3 * i + 2]], at = starts[m] + i, t0 = vector(rest);
@@ -205,6 +224,7 @@
           here.lines = lines;
           here.values = sections();
           for (const key of Object.keys(ranges)) delete ranges[key];
+          showLegend();
           here.told = tabled(told);
           carry();
         } else here.told = { ...here.told, ...told };
@@ -232,7 +252,9 @@
     function ofMotion() {
       const h = given.step, speed = { by: 1 };
       // Arguments go to what is wanted within the steps of a frame: where nodes jump, velocities would not be finite.
-      let now = [...defaults], wanted = [...defaults], time = 0, running = 0, spare = 0, status = DONE, taken = new Set();
+      let now = [...defaults], wanted = [...defaults], gone = 0, able = Infinity, time = 0, running = 0, spare = 0, status = DONE;
+      // Histories that a slider has taken over, and those of them that go back to their course.
+      let taken = new Set(), returning = new Set();
       const driven = given.arguments.filter((one) => given.histories[one.name]).map((one) => [one.first, given.histories[one.name]]);
       const course = ({ t, pieces, value }, at) => {
         if (!pieces.length || at <= t[0]) return pieces.length ? pieces[0][0] : value;
@@ -249,7 +271,7 @@
       const step = (length, from, to, halvings) => {
         given.times.forEach((share, k) => inputs.set(valuesAt(time + share * length, from + share * (to - from)), k * count));
         status = timed(() => code.live_step_now(length));
-        if (status === DONE) time += length;
+        if (status === DONE) [time, gone] = [time + length, to];
         else if (halvings) {
           const middle = 0.5 * (from + to);
           if (step(0.5 * length, from, middle, halvings - 1) === DONE) step(0.5 * length, middle, to, halvings - 1);
@@ -257,25 +279,34 @@
         return status;
       };
       /** So many steps, as far as there is time for them. */
-      const advance = (steps, until = Infinity) => {
+      const advance = (steps, until) => {
+        for (const [j, history] of driven) if (returning.has(j)) wanted[j] = course(history, time + steps * h);
         if (wanted.some((one, j) => one !== now[j])) code.live_fresh();
+        // No more than there was time for in the frame before.
+        const within = Math.max(1, Math.min(steps, able)), share = (k) => Math.min(1, k / within);
         let done = 0;
-        while (done < steps && performance.now() < until && step(h, done / steps, (done + 1) / steps, HALVINGS) === DONE) done++;
-        now = steps ? valuesAt(time, done / steps) : now;
+        gone = 0;
+        while (done < steps && performance.now() < until && step(h, share(done), share(done + 1), HALVINGS) === DONE) done++;
+        able = done < steps ? Math.max(1, done) : Infinity;
+        now = valuesAt(time, gone);
+        if (steps && done === steps) {
+          for (const j of returning) taken.delete(j);
+          returning = new Set();
+        }
         for (const [j] of driven) if (!taken.has(j)) wanted[j] = now[j];
         return done;
       };
       const tell = () => {
-        const good = status === DONE;
-        if (good) {
-          lines = places();
-          Object.assign(here, { at: time, lines, values: null, told: tabled({ time }) });
-          carry();
+        if (status !== DONE) {
+          // Of the last state that there is.
+          inputs.set(now);
+          code.live_tell_now();
         }
-        here.stable = null;
-        here.text = `live: time ${short(time)} s`;
+        lines = places();
+        Object.assign(here, { at: time, lines, values: null, told: tabled({ time }), stable: null, text: `live: time ${short(time)} s` });
+        carry();
         showFields(wanted);
-        say(good ? `Time ${short(time)} s, ${running ? "running" : "stopped"}` : `Stopped at ${short(time)} s: ${sentences[status]}`, status);
+        say(status === DONE ? `Time ${short(time)} s, ${running ? "running" : "stopped"}` : `Stopped at ${short(time)} s: ${sentences[status]}`, status);
         rate("steps");
       };
       const pause = () => {
@@ -287,7 +318,13 @@
         const mine = (running = performance.now());
         let before = mine;
         // Where it stopped it is tried again.
-        status = DONE;
+        if (status !== DONE) {
+          status = DONE;
+          inputs.set(now);
+          code.live_tell_now();
+        }
+        stop();
+        tell();
         $("live-run").textContent = "stop";
         const span = states[last].at - states[0].at, pace = (span > 0 ? span : data.seconds) / data.seconds;
         const tick = (stamp) => {
@@ -306,14 +343,18 @@
       };
       const restart = () => {
         code.live_start();
-        [wanted, time, spare, status, taken] = [[...defaults], 0, 0, DONE, new Set()];
+        [wanted, time, spare, status, taken, returning] = [[...defaults], 0, 0, DONE, new Set(), new Set()];
         now = [...wanted];
         inputs.set(now);
         code.live_tell_now();
         tell();
       };
       const follow = (values) => {
-        for (const [j] of driven) if (values[j] !== wanted[j]) taken.add(j);
+        for (const [j] of driven) {
+          if (values[j] === wanted[j]) continue;
+          taken.add(j);
+          returning.delete(j);
+        }
         wanted = values;
         showFields(wanted);
         return status;
@@ -338,7 +379,7 @@
           run();
         },
         restore: () => {
-          taken = new Set();
+          returning = new Set(taken);
           wanted = wanted.map((one, j) => (driven.some(([k]) => k === j) ? one : defaults[j]));
           showFields(wanted);
         },
@@ -351,10 +392,10 @@
             run();
           });
           again.addEventListener("click", () => {
-            const ran = running;
+            stop();
             restart();
             go(known);
-            if (!ran) run();
+            run();
           });
           const label = made("label", " speed ", row), choice = made("select", undefined, label);
           choice.id = "live-speed";
@@ -435,17 +476,21 @@
         for (const field of [input, number]) {
           field.addEventListener(field === input ? "input" : "change", () => {
             const values = [...solver.from()];
-            values[at] = Number(field.value);
+            delete number.dataset.typed;
+            // What is no number changes nothing.
+            if (Number.isFinite(field.valueAsNumber)) values[at] = field.valueAsNumber;
             stop();
             solver.follow(values);
             go(known);
           });
         }
+        number.addEventListener("input", () => { number.dataset.typed = "yes"; });
         fields.push({ input, number });
       });
     }
     const back = made("button", "as in the scene", panel);
     back.addEventListener("click", () => {
+      stop();
       solver.restore();
       go(known);
     });

@@ -337,12 +337,16 @@
       }
       $("bar").getContext("2d").putImageData(new ImageData(pixels, 256, 1), 0, 0);
       if (gl) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pixels.buffer));
-      const [low, high] = range(key);
-      $("low").textContent = nothing[key] ? "" : short(Math.abs(low) < SMALL * high ? 0 : low);
-      $("named").textContent = nothing[key] ? `${one.label}: 0 everywhere` : `${one.label}, ${one.unit}`;
-      $("high").textContent = nothing[key] ? "" : short(high);
+      showLegend();
     }
     draw();
+  };
+  const showLegend = () => {
+    if (!colour) return;
+    const one = quantities.find((found) => found.key === colour), [low, high] = range(colour), empty = nothing[colour];
+    $("low").textContent = empty ? "" : short(Math.abs(low) < SMALL * high ? 0 : low);
+    $("named").textContent = empty ? `${one.label}: 0 everywhere` : `${one.label}, ${one.unit}`;
+    $("high").textContent = empty ? "" : short(high);
   };
   const short = (value) => String(Number(value.toPrecision(4)));
 
