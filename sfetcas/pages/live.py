@@ -131,10 +131,10 @@ def live_of(
     offered = {one.name: _spans(scene, one) for one in made.arguments.arguments}
     if scene.analysis.range:
         # A path need not come to the factor of its loads.
+        low, high = scene.analysis.range
         for one in manifest["arguments"]:
-            one["default"] = (
-                np.clip(one["default"], *scene.analysis.range).item() if one["name"] == FACTOR else one["default"]
-            )
+            if one["name"] == FACTOR:
+                one["default"] = min(max(one["default"], low), high)
     tangents = {name: scene.center_lines[name].tangents(x).ravel().tolist() for name, x in flexible.items()}
     found = {
         "module": base64.b64encode(module).decode(),
