@@ -13,7 +13,8 @@ from sfetcas import Scene, SceneError, load, solve
 from sfetcas.cli import main
 from sfetcas.codegen.timestep import time_step
 from sfetcas.pages import live, page
-from sfetcas.pages.content import content_of
+from sfetcas.pages.content import MOST_STATES, content_of
+from sfetcas.pages.page import LIVE_SHARE
 from sfetcas.parametric.equilibrium import equilibrium_solver
 
 pytest.importorskip("playwright")
@@ -253,13 +254,21 @@ MOTIONS = (
 )
 STEPS = 20
 
+MOST = 2_000_000
+"""Bytes of a page."""
+
 
 @pytest.mark.parametrize("name", MOTIONS)
-def test_the_page_takes_the_steps_of_the_process(opened, swinging, name):
+def test_the_page_takes_the_steps_of_the_process(opened, swinging, tmp_path, name):
     """With constant arguments, and as the histories of the scene go."""
-    answer, file = swinging if name == "swinging" else (solve(load(PROBLEMS / f"{name}.toml")), None)
-    scene, page = answer.scene, opened(answer, file, live=True)
-    flexible = {m["name"]: m["x"] for m in content_of(answer)["members"] if m["type"] == "flexible"}
+    answer, file = swinging
+    if name != "swinging":
+        answer = solve(load(PROBLEMS / f"{name}.toml"))
+        file = answer.page(tmp_path / "page.html", live=True)
+    assert file.stat().st_size < MOST
+    scene, page = answer.scene, opened(answer, file)
+    shown = content_of(answer, most=MOST_STATES // LIVE_SHARE)["members"]
+    flexible = {m["name"]: m["x"] for m in shown if m["type"] == "flexible"}
     own = time_step(scene, "live", places=flexible)
     defaults, names = own.arguments.defaults, [name for one in own.arguments.arguments for name in one.names]
     courses = {i: scene.histories[n.split(".")[1]] for i, n in enumerate(names) if n.startswith("histories.")}

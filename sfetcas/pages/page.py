@@ -22,13 +22,16 @@ from ..pictures.files import check_ending
 from .content import MOST_STATES, Shown, content_of
 from .live import check_live, live_of
 
-__all__ = ["ENDINGS", "View", "page_of", "save_page"]
+__all__ = ["ENDINGS", "LIVE_SHARE", "View", "page_of", "save_page"]
 
 PARTS = File(__file__).parent
 HEIGHT = 560
 """Of a page in a notebook, pixels."""
 
 LIVE_PART = "  /* On live pages the text of live.js stands here. */\n"
+
+LIVE_SHARE = 3
+"""Of so many states of a path or a motion a live page has one."""
 
 ENDINGS = (".html", ".htm")
 """Endings of the files that pages are written to."""
@@ -61,7 +64,7 @@ def page_of(
     settings : Settings, optional
         Accuracy and elements of the solver of a live page.
     most : int
-        States of a path or a motion at most.
+        States of a path or a motion at most, a third of them on a live page.
 
     Raises
     ------
@@ -76,7 +79,8 @@ def page_of(
     if source is None:
         source = json.dumps(answer.scene.to_dict(), indent=2, ensure_ascii=False)
     said = repr(answer) if said is None else said
-    found = content_of(answer, source, said, most=most)
+    # The solver takes most of the room, and makes states of its own.
+    found = content_of(answer, source, said, most=most // LIVE_SHARE if live else most)
     if live:
         places = {member["name"]: np.array(member["x"]) for member in found["members"]}
         found["live"] = live_of(answer.scene, places, arguments, settings)
