@@ -215,7 +215,14 @@ displacement = [1, 0]
 
 @pytest.mark.parametrize(
     ("gravity", "up"),
-    [((0, -9.81, 0), 1), ((9.81, 0, 0), 0), ((0, 0, 9.81), 2), ((0, 0, -9.81), 2), ((1.0, 1.0, 0.0), 2)],
+    [
+        ((0, -9.81, 0), 1),
+        ((1e-15, -9.81, -2e-15), 1),
+        ((9.81, 0, 0), 0),
+        ((0, 0, 9.81), 2),
+        ((0, 0, -9.81), 2),
+        ((1.0, 1.0, 0.0), 2),
+    ],
 )
 def test_gravity_goes_downwards_where_it_is_along_an_axis(bend, gravity, up):
     view = content._upright(gravity, bend.last.along("bend", np.linspace(0, 1, 9))["position"])

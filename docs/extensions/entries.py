@@ -129,10 +129,10 @@ def _of_scene(file: Path) -> Entry:
         # All its parts have their places.
         figure.set_layout_engine("none")
     _save(figure, file)
-    _turn(answer, file, file.read_text(encoding="utf-8"), said.getvalue())
+    found = said.getvalue()
+    _turn(answer, file, file.read_text(encoding="utf-8"), found)
     title = scene.title or file.stem
     command = f"sfetcas run problems/{file.name} --plot {file.stem}.png"
-    found = said.getvalue()
     return Entry(
         file.stem,
         title,

@@ -73,6 +73,9 @@ least.
 DIGITS = 1e-5
 """Places of symbols are rounded to this share of the size."""
 
+ALONG = 0.9
+"""Share of gravity along an axis from which on that is downwards in the view."""
+
 DRAWN = ("moment", "twist", "curvature", "tension", "shear", "stress")
 """Quantities along members by which a page colours them."""
 
@@ -183,13 +186,12 @@ def content_of(answer: Shown, source: str = "", said: str = "", *, most: int = M
 
 
 def _upright(gravity: Sequence[float] | None, points: Array) -> View:
-    """The view in space from which points (n, 3) are seen well, with gravity downwards where it is along an axis."""
+    """The view in space that shows points (n, 3) well; gravity is downwards where it is nearly along an axis."""
     pull = np.zeros(3) if gravity is None else np.asarray(gravity, float)
-    along = np.flatnonzero(pull)
-    if len(along) != 1 or pull[2] < 0.0:
+    down = int(np.abs(pull).argmax())
+    if abs(pull[down]) <= ALONG * np.linalg.norm(pull) or (down == 2 and pull[2] < 0.0):
         return view_of(True, [points])
     # Axes whose third is upwards.
-    down = int(along[0])
     up, first = -np.sign(pull[down]) * np.eye(3)[down], np.eye(3)[(down + 1) % 3]
     axes = np.stack([first, np.cross(up, first), up])
     view = view_of(True, [points @ axes.T])

@@ -250,9 +250,9 @@
     // -- a motion -----------------------------------------------------------------------------------------------------
 
     function ofMotion() {
-      const h = given.step, speed = { by: 1 };
+      const h = given.step;
       // Arguments go to what is wanted within the steps of a frame: where nodes jump, velocities would not be finite.
-      let now = [...defaults], wanted = [...defaults], gone = 0, able = Infinity, time = 0, running = 0, spare = 0, status = DONE;
+      let now = [...defaults], wanted = [...defaults], gone = 0, able = Infinity, time = 0, running = 0, spare = 0, speed = 1, status = DONE;
       // Histories that a slider has taken over, and those of them that go back to their course.
       let taken = new Set(), returning = new Set();
       const driven = given.arguments.filter((one) => given.histories[one.name]).map((one) => [one.first, given.histories[one.name]]);
@@ -330,7 +330,7 @@
         const tick = (stamp) => {
           if (running !== mine) return;
           if (state !== known) return pause();
-          spare += Math.max(0, Math.min(stamp - before, 100)) * 0.001 * pace * speed.by;
+          spare += Math.max(0, Math.min(stamp - before, 100)) * 0.001 * pace * speed;
           before = stamp;
           const wishes = Math.floor(spare / h), done = advance(wishes, performance.now() + FRAME);
           spare = done < wishes ? 0 : spare - done * h;
@@ -401,7 +401,7 @@
           choice.id = "live-speed";
           SPEEDS.forEach((one) => { made("option", `× ${one}`, choice).value = one; });
           choice.value = "1";
-          choice.addEventListener("change", () => { speed.by = Number(choice.value); });
+          choice.addEventListener("change", () => { speed = Number(choice.value); });
         },
         help: "The motion is solved as it is seen, step by step. Drag a slider, the tip of a force, or a node that a motion moves, while it runs. A history goes on as in the scene until its slider is moved.",
       };

@@ -68,7 +68,7 @@ SYSROOTS = ("/usr", "/opt/wasi-sysroot", "/opt/wasi-sdk/share/wasi-sysroot")
 """Where a library for WebAssembly may be, beside what WASI_SYSROOT says."""
 
 
-LIVELY = ("static", "path", "dynamic")
+LIVE_ANALYSES = ("static", "path", "dynamic")
 """Analyses that have live pages; of a path its equilibria are solved."""
 
 
@@ -81,8 +81,8 @@ def check_live(scene: Scene) -> None:
         The analysis is that of modes, or there is no compiler.
     """
     kind = scene.analysis.type
-    if kind not in LIVELY:
-        raise SceneError(f"found the analysis {kind!r}, accepted: {', '.join(map(repr, LIVELY))}", ("live",))
+    if kind not in LIVE_ANALYSES:
+        raise SceneError(f"found the analysis {kind!r}, accepted: {', '.join(map(repr, LIVE_ANALYSES))}", ("live",))
     _compiler()
 
 
