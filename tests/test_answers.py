@@ -77,7 +77,7 @@ TURNED = {"EI2": 2.0, "EI3": 1.0, "GJ": 1.0, "rhoA": 1.0, "rhoI": [0.02, 0.01, 0
         ("reactions.B.force", "node 'B' is free: no ground acts on it"),
         ("members.m.bending_stress at 0", "found 'members.m.bending_stress', accepted of 'm': position, "),
         ("springs.k.travel", "found 'springs.k.travel', accepted of 'k': angle, moment"),
-        ("energy.kinetic", "found 'energy.kinetic', told of motion only, accepted of statics: energy.elastic"),
+        ("energy.kinetic", "found 'energy.kinetic', told of motion, steps only, accepted of statics: energy.elastic"),
         ("modes.omega", "found 'modes.omega', told of modes only, accepted of statics: factor, omega, nodes.*"),
     ],
 )

@@ -43,6 +43,11 @@ def told(page):
     return page.window.locator("#live-status").inner_text()
 
 
+def energy(page, key):
+    """An energy as the page tells it, in J."""
+    return float(re.search(rf"{key} ([\d.e+-]+)", page.window.locator("#live-energy").inner_text())[1])
+
+
 def shown(page, node):
     """The position of a node as the page tells it."""
     page.click(node=node)
@@ -93,6 +98,8 @@ def test_a_slider_changes_the_answer_as_another_run_does(opened, bend):
         # Both are within the accuracy of the true one.
         error = 10.0 * bend.scene.analysis.accuracy * 100.0
         assert shown(page, "tip") == pytest.approx(step.position("tip").tolist(), abs=error)
+        # Four digits are told.
+        assert energy(page, "elastic") == pytest.approx(step.energy["elastic"], rel=1e-3)
     entered(page, 0, 100.0)
     assert page.inked() != before
     slider = page.window.locator("#argument-0")
@@ -309,6 +316,10 @@ def test_a_motion_runs_stops_and_begins_anew(opened, swinging):
     # The history of the scene went on by itself, and the tip with it.
     assert float(page.window.locator("#number-0").input_value()) == 1.0
     assert place[1] > 0.1
+    # The load does all the work: damping takes a part of it.
+    kinetic, elastic, total = (energy(page, key) for key in ("kinetic", "elastic", "total"))
+    assert kinetic > 0.0 < elastic
+    assert -1.001 * place[1] < total - kinetic - elastic < total < 0.0
     page.window.wait_for_timeout(100)
     assert seconds(page) == first
     page.window.locator("#live-run").click()

@@ -18,8 +18,13 @@ from test_codegen import built, needs_compiler, said
 
 from sfetcas import Scene, SceneError, export, load, solve
 from sfetcas.codegen.timestep import time_step
+from sfetcas.dynamics.inertia import Inertia
+from sfetcas.dynamics.stages import StageEquations
 from sfetcas.dynamics.steps import LAST_CHANGE
 from sfetcas.mathematics import core as c
+from sfetcas.mechanics.equations import Equations, State
+from sfetcas.mechanics.masses import masses_of
+from sfetcas.mechanics.model import assemble
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 MOVING = ["cantilever_force_pulse", "slider_crank_motion", "pendulum_flexible_smooth", "pendulums_rigid"]
@@ -75,6 +80,38 @@ def test_steps_are_those_of_the_simulation(integrator):
     assert found["nodes.B.position"] == pytest.approx(last.position("B"), abs=1e-9)
     # Velocities of answers come of polynomials through several steps: those of a step are of its order only.
     assert found["nodes.B.velocity"] == pytest.approx(last.velocity("B"), abs=0.1)
+    assert found["energy.elastic"] == pytest.approx(last.energy["elastic"], abs=1e-9)
+    assert found["energy.kinetic"] == pytest.approx(last.energy["kinetic"], rel=2e-3)
+    if integrator == "conserving":
+        # What it keeps is rounding in each of the steps.
+        assert abs(found["energy.total"]) <= 1e-12
+
+
+ENERGIES = ["energy.kinetic", "energy.elastic", "energy.loads", "energy.total"]
+
+
+@pytest.mark.parametrize("name", EVERYTHING)
+def test_energies_of_steps(name):
+    """Of all kinds of terms and masses, against the evaluation in floating point."""
+    scene, given = driven(name)
+    made = time_step(scene, "motion", arguments=given, results=ENERGIES)
+    # The factor is 1, as of what has no history in a scene.
+    shares = [(1.0 if one.name == "factor" else 0.6) * np.array(one.default) for one in made.arguments.arguments]
+    p = np.concatenate([*shares, np.zeros(0)])
+    state = made.step(made.step(made.begin, 0.01, p), 0.01, p)
+    kinetic, elastic, loads, total = made.outputs(state, p)
+    parts, scales = parts_of(made, state), made.model.scales
+    rates = parts["rates"].reshape(made.method.kept, -1)[0]
+    assert kinetic == pytest.approx(Inertia(made.system).kinetic(rates) * scales.moment, rel=1e-12)
+    model = assemble(made.arguments.scene_at(p), made.model.mesh, assembly="nodal", scales=scales)
+    own = StageEquations(Equations(model), masses_of(model), "interpreted")
+    q = parts["q"].reshape(made.system.layout.rotations, -1)
+    still = State(q, parts["y"], np.zeros(0), parts["near"])
+    point = own.equations.at(still, own.loading(own.factors(0.0)))
+    assert elastic == pytest.approx(point.strain * scales.moment, rel=1e-10)
+    assert loads == pytest.approx((point.potential - point.strain) * scales.moment, rel=1e-10, abs=1e-14)
+    assert total == pytest.approx(kinetic + elastic + loads, rel=1e-12)
+    assert kinetic > 0.0
 
 
 needs_core = pytest.mark.skipif(c.core() is None, reason="no core here, and no compiler that makes one")

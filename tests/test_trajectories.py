@@ -156,13 +156,17 @@ def test_too_short_a_time_is_told_with_the_last_iterate():
 
 
 def test_effort_of_a_rigid_arm_is_that_of_the_closed_form():
-    motion = solved(turning(arm(0)))
+    problem = turning(arm(0))
+    problem.subject_to(problem.answer("energy.kinetic") <= 10.0)
+    motion = solved(problem)
     # The best torque is linear in time, as controls are; the circle of the tip is met to order 5 in 10 intervals.
     assert motion.cost == pytest.approx(LEAST, rel=1e-5)
     torque = 6.0 * INERTIA * ANGLE / TIME**2 * (1.0 - 2.0 * motion.ends / TIME)
     np.testing.assert_allclose(motion.control(TORQUE), torque, atol=1e-4)
     angle = ANGLE * (3.0 * (motion.times / TIME) ** 2 - 2.0 * (motion.times / TIME) ** 3)
     np.testing.assert_allclose(motion.answer("nodes.hub.angle").ravel(), angle, atol=1e-4)
+    speed = 6.0 * ANGLE / TIME * (motion.times / TIME - (motion.times / TIME) ** 2)
+    np.testing.assert_allclose(motion.answer("energy.kinetic").ravel(), 0.5 * INERTIA * speed**2, atol=1e-4)
 
 
 def test_effort_of_a_flexible_arm_tends_to_that_of_the_rigid_one(flexible):

@@ -205,10 +205,10 @@ contacts.NAME.friction | N | x y z | statics, motion | with `friction`: the part
 contacts.NAME.sticking | | | statics, motion | with `friction`: whether it does; in motions a list of what does
 energy.elastic | J | | all | of members, springs, tendons and tubes
 energy.dissipated | J | | statics, motion | by laws with memory, since undeformed; in motion also by impacts, friction
-energy.loads | J | | statics, motion, parameters | from the undeformed scene
-energy.total | J | | statics, motion, parameters | sum of all that there are
+energy.loads | J | | all | from the undeformed scene
+energy.total | J | | all | sum of all that there are
 energy.potential | J | | statics, parameters | another name of the total of an equilibrium
-energy.kinetic | J | | motion | of all masses
+energy.kinetic | J | | motion, steps | of all masses
 momentum.linear | kg m/s | x y z | motion | of all masses
 momentum.angular | kg m²/s | x y z | motion | about the centre of mass
 certificate.residual | | | statics | relative, of all equations

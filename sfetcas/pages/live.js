@@ -146,7 +146,10 @@
       $("live-status").textContent = text;
       $("live-status").dataset.status = status;
     };
-    const rate = (what) => {
+    /** The energies of the state, and how fast it was found. */
+    const footer = (what) => {
+      const energies = Object.entries(here.told.energy || {}).filter(([, one]) => Number.isFinite(one));
+      $("live-energy").textContent = energies.length ? `Energy: ${energies.map(([key, one]) => `${key} ${short(one)}`).join(", ")} J` : "";
       $("live-rate").textContent = spent.time > 0 ? `${Math.round((1000 * spent.count) / spent.time)} ${what} a second` : "";
     };
 
@@ -233,7 +236,7 @@
         const said = solved ? (status === UNSTABLE ? "unstable" : snapped ? "solved; it snapped" : "solved") : "no solution";
         here.text = `live: ${said}`;
         say(solved ? `${said[0].toUpperCase()}${said.slice(1)}, residual ${residual.toExponential(1)}, estimated error ${Number.isFinite(error) ? error.toExponential(1) : "none"}` : `No solution: ${sentences[status]}. What is shown is the last one.`, status);
-        rate("solves");
+        footer("solves");
       };
       return {
         follow, now: () => now, from: () => now || defaults,
@@ -307,7 +310,7 @@
         carry();
         showFields(wanted);
         say(status === DONE ? `Time ${short(time)} s, ${running ? "running" : "stopped"}` : `Stopped at ${short(time)} s: ${sentences[status]}`, status);
-        rate("steps");
+        footer("steps");
       };
       const pause = () => {
         running = 0;
@@ -462,6 +465,7 @@
 
     const panel = addPanel("Live");
     made("p", "", panel).id = "live-status";
+    made("p", "", panel).id = "live-energy";
     if (solver.controls) solver.controls(panel);
     for (const one of given.arguments) {
       one.spans.forEach(([low, high], i) => {

@@ -348,7 +348,10 @@
     $("named").textContent = empty ? `${one.label}: 0 everywhere` : `${one.label}, ${one.unit}`;
     $("high").textContent = empty ? "" : short(high);
   };
-  const short = (value) => String(Number(value.toPrecision(4)));
+  const short = (value) => {
+    const found = Number(value.toPrecision(4));
+    return found && Math.abs(found) < 1e-3 ? found.toExponential() : String(found);
+  };
 
   // -- symbols --------------------------------------------------------------------------------------------------------
 

@@ -22,7 +22,7 @@ from ..mechanics.masses import Masses, masses_of
 from ..mechanics.unilateral import NONE, UnilateralRows
 from .arguments import Arguments
 from .equilibrium import refuse_search
-from .results import Results
+from .results import Moving, Results
 
 __all__ = ["ParametricStages", "answers_of_motion", "motion_of", "parametric_stages"]
 
@@ -103,7 +103,8 @@ def answers_of_motion(results: Results, arguments: Arguments, system: Parametric
     state, p, rates = ca.MX.sym("state", program.states), ca.MX.sym("numbers", layout.factors), ca.MX.sym("v", layout.x)
     places = ca.reshape(rates[: system.axes * system.places], system.axes, system.places)
     speeds = places * (arguments.model.scales.length / time)
-    outputs = results.expression(program, arguments.undeformed(p), speeds)
+    kinetic = 0.5 * ca.dot(rates, system.forces(ca.MX.zeros(rates.shape), rates))
+    outputs = results.expression(program, arguments.undeformed(p), Moving(speeds, kinetic))
     as_given = ca.substitute([outputs], [program.state_symbol, program.symbol], [state, arguments.given(p)])[0]
     return ca.Function("answers", [state, p, rates], [ca.densify(as_given)], ["state", "numbers", "v"], ["results"])
 

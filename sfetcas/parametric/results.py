@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -37,7 +38,7 @@ from ..mechanics.tendon_shares import NEWTON_STEPS, section_data, share_of, stre
 from ..mechanics.terms import Group, answers_of
 from ..solvers.program import Program
 
-__all__ = ["Outputs", "Result", "Results", "default_motion_results", "default_results"]
+__all__ = ["Moving", "Outputs", "Result", "Results", "default_motion_results", "default_results"]
 
 
 @dataclass(frozen=True)
@@ -102,14 +103,15 @@ def default_results(model: Model, *, unique: bool = True) -> list[str]:
 
 
 def default_motion_results(model: Model) -> list[str]:
-    """Default results of a motion: positions, rotations and velocities of nodes, positions along members, springs and
-    what obstacles do.
+    """Default results of a motion: positions, rotations and velocities of nodes, positions along members, springs,
+    what obstacles do, and energies.
     """
     every = [answer_name(name) for name in default_results(model, unique=False)]
     moving = [name.text for name in every if name.kind.table == "nodes" or name.kind.key == "position"]
     sprung = [name.text for name in every if name.kind.table == "springs" and name.kind.key in TRAVELS]
     pushed = [name.text for name in every if name.kind.table == "contacts"]
-    return [*moving, *(f"nodes.{name}.velocity" for name in model.nodes), *sprung, *pushed]
+    energies = [f"energy.{key}" for key in ("kinetic", "elastic", "total")]
+    return [*moving, *(f"nodes.{name}.velocity" for name in model.nodes), *sprung, *pushed, *energies]
 
 
 TRAVELS = ("angle", "travel")
@@ -382,19 +384,25 @@ class Results:
 
     def touches(self, program: Program, rest: ca.MX, points: Sequence[ContactPoint]) -> ca.MX:
         """Where points on obstacles are, fractions (points,) of the lengths of their members."""
-        outputs = Outputs(self, program, rest, None)
+        outputs = Outputs(self, program, rest)
         return ca.densify(ca.vertcat(ca.MX(0, 1), *(outputs.place(point, 0) for point in points)))
 
-    def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None) -> ca.MX:
-        """All results (size,), one after the other, each row by row, in SI units.
-
-        ``speeds`` (axes, places) are velocities of a motion.
-        """
-        outputs = Outputs(self, program, rest, speeds)
+    def expression(self, program: Program, rest: ca.MX, moving: Moving | None = None) -> ca.MX:
+        """All results (size,), one after the other, each row by row, in SI units."""
+        outputs = Outputs(self, program, rest, moving)
         found = ca.vertcat(*(ca.densify(ca.vec(outputs.value(result.asked).T)) for result in self.results))
         # Where a magnet is beyond the table of a field there are no answers.
         beyond = outputs.beyond()
         return found if beyond is None else ca.if_else(beyond > tolerances.WRITTEN, np.nan, found)
+
+
+class Moving(NamedTuple):
+    """What a motion tells beside its state: velocities of places (axes, places), m/s, and its kinetic energy,
+    dimensionless.
+    """
+
+    speeds: ca.MX
+    kinetic: ca.MX
 
 
 class Outputs:
@@ -406,12 +414,12 @@ class Outputs:
     program : Program
     rest : MX
         As of :meth:`Results.rest`.
-    speeds : MX (axes, places) or None
-        Velocities of a motion.
+    moving : Moving, optional
+        What a motion tells beside its state.
     """
 
-    def __init__(self, results: Results, program: Program, rest: ca.MX, speeds: ca.MX | None) -> None:
-        self._speeds = speeds
+    def __init__(self, results: Results, program: Program, rest: ca.MX, moving: Moving | None = None) -> None:
+        self._moving = moving
         self._results, self._program = results, program
         self._model, self._expressions = program.model, program.expressions
         model, expressions = self._model, self._expressions
@@ -461,9 +469,10 @@ class Outputs:
         """A result at all places, with all components."""
         kind, record, key = name.kind, name.record, name.kind.key
         if kind.table == "energy":
-            strain, total = self._program.strain, self._program.potential
-            energies = {"elastic": strain, "loads": total - strain, "total": total, "potential": total}
-            return energies[key] * self._model.scales.moment
+            strain, potential = self._program.strain, self._program.potential
+            kinetic = ca.MX(0) if self._moving is None else self._moving.kinetic
+            energies = {"elastic": strain, "kinetic": kinetic, "loads": potential - strain, "potential": potential}
+            return energies.get(key, kinetic + potential) * self._model.scales.moment
         if not key:
             return self._tangent(kind.table, record)
         if kind.table == "springs":
@@ -491,8 +500,8 @@ class Outputs:
     def _node(self, node: str, key: str) -> ca.MX:
         number = self._model.nodes.index(node)
         if key == "velocity":
-            assert self._speeds is not None
-            return self._three(self._speeds[:, number]).T
+            assert self._moving is not None
+            return self._three(self._moving.speeds[:, number]).T
         if key == "position":
             moved = self._three(self._places[:, number]) * self._model.scales.length
             return (self._rest[:, number] + moved).T
