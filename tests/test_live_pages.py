@@ -4,6 +4,7 @@ import importlib.util
 import os
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -610,3 +611,26 @@ def test_without_a_compiler_a_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(SceneError, match=r"found no compiler for WebAssembly, accepted: after pip install"):
         live.check_live(load(PROBLEMS / "bend_45_degrees.toml"))
+
+
+needs_clang = pytest.mark.skipif(
+    not (shutil.which("clang") and shutil.which("wasm-ld")), reason="no clang for WebAssembly here"
+)
+
+
+@needs_clang
+def test_clang_compiles_what_zig_does(opened, swinging, tmp_path, monkeypatch):
+    found = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "ziglang" else found(name))
+    answer, file = swinging
+    pages = [opened(answer, one) for one in (file, answer.page(tmp_path / "clang.html", live=True))]
+    both = [page.run("sfetcas.steps(20, null)")["results"] for page in pages]
+    assert both[0] == pytest.approx(both[1], abs=1e-12)
+
+
+def test_a_compiler_that_fails_says_why(monkeypatch, tmp_path):
+    """By its first error, not by the last line, that something went wrong."""
+    monkeypatch.setattr(live, "_compiler", lambda: [sys.executable, str(tmp_path / "compiler.py")])
+    (tmp_path / "compiler.py").write_text("raise SystemExit('glue.c: error: no stdio.h\\nclang: error: it failed')")
+    with pytest.raises(SceneError, match=r"^live: the compiler for WebAssembly failed: glue.c: error: no stdio.h$"):
+        live._compiled(tmp_path, [])

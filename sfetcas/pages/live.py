@@ -60,8 +60,8 @@ int live_step_now(double h) { return live_step_through(&memory, h, arguments, st
 """
 
 MISSING = (
-    "found no compiler for WebAssembly, accepted: after pip install 'sfetcas[page]', or with the programs clang and "
-    "wasm-ld and a library wasi-libc"
+    "found no compiler for WebAssembly, accepted: after pip install 'sfetcas[page]', or with clang, wasm-ld, "
+    "wasi-libc and compiler-rt for wasm32 (Debian: clang lld wasi-libc libclang-rt-dev-wasm32)"
 )
 
 SYSROOTS = ("/usr", "/opt/wasi-sysroot", "/opt/wasi-sdk/share/wasi-sysroot")
@@ -259,5 +259,7 @@ def _compiled(folder: Path, names: Sequence[str]) -> bytes:
     ran = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     if ran.returncode:
         said = [line for line in ran.stderr.splitlines() if line.strip()]
-        raise SceneError(f"the compiler for WebAssembly failed: {said[-1] if said else ran.returncode}", ("live",))
+        # The first error says what is wrong, the last line that something was.
+        first = next((line for line in said if "error" in line), said[-1] if said else ran.returncode)
+        raise SceneError(f"the compiler for WebAssembly failed: {first}", ("live",))
     return (folder / "live.wasm").read_bytes()
