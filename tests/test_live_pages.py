@@ -14,8 +14,7 @@ from sfetcas import Scene, SceneError, load, solve
 from sfetcas.cli import main
 from sfetcas.codegen.timestep import time_step
 from sfetcas.pages import live, page
-from sfetcas.pages.content import MOST_STATES, content_of
-from sfetcas.pages.page import LIVE_SHARE
+from sfetcas.pages.content import content_of
 from sfetcas.parametric.equilibrium import equilibrium_solver
 
 pytest.importorskip("playwright")
@@ -275,7 +274,7 @@ def test_the_page_takes_the_steps_of_the_process(opened, swinging, tmp_path, nam
         file = answer.page(tmp_path / "page.html", live=True)
     assert file.stat().st_size < MOST
     scene, page = answer.scene, opened(answer, file)
-    shown = content_of(answer, most=MOST_STATES // LIVE_SHARE)["members"]
+    shown = content_of(answer)["members"]
     flexible = {m["name"]: m["x"] for m in shown if m["type"] == "flexible"}
     own = time_step(scene, "live", places=flexible)
     defaults, names = own.arguments.defaults, [name for one in own.arguments.arguments for name in one.names]
@@ -597,6 +596,11 @@ def test_the_slider_of_a_factor_goes_along_the_path(monkeypatch):
         ),
         ("bend_45_degrees", ["--argument", "factor"], "--argument: found without effect, accepted: with --live"),
         ("bend_45_degrees", ["--live", "--argument", "loads.up.value"], "loads.up"),
+        (
+            "slider_crank_motion",
+            ["--live", "--argument", "nodes.slider.mass"],
+            "a number on which nothing depends in the steps of a motion, accepted: loads, motions, stiffness",
+        ),
     ],
 )
 def test_what_no_live_page_shows_is_refused(tmp_path, capsys, name, words, sentence):
@@ -604,6 +608,13 @@ def test_what_no_live_page_shows_is_refused(tmp_path, capsys, name, words, sente
     assert main(["page", str(PROBLEMS / f"{name}.toml"), str(out), *words]) == 2
     assert sentence in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_steps_that_no_live_page_takes_are_refused(monkeypatch, swinging):
+    monkeypatch.setattr(live, "_compiled", lambda folder, names: b"")
+    scene = swinging[0].scene.replace({"analysis.step": 1e-8})
+    with pytest.raises(SceneError, match=r"^analysis.step: found 1e-08 s, accepted of a live page: at least 5e-07 s"):
+        live.live_of(scene, {"m": np.array([0.0, 1.0])})
 
 
 def test_without_a_compiler_a_sentence_says_what_to_install(monkeypatch):

@@ -530,7 +530,7 @@ def test_bad_cases_are_refused_in_a_sentence(cases, sentence):
         (["reactions.B.force"], "node 'B' is free: no ground acts on it"),
         (
             ["energy.kinetic"],
-            "'energy.kinetic', told of motion only, accepted of statics: energy.elastic, energy.dissipated",
+            "'energy.kinetic', told of motion, steps only, accepted of statics: energy.elastic, energy.dissipated",
         ),
         (["certificate.stable"], "found 'certificate.stable', accepted: a quantity made of numbers"),
     ],

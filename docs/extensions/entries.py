@@ -29,7 +29,7 @@ from sfetcas import Modes, Scene, load, solve
 from sfetcas.checks import check
 from sfetcas.description.records import say
 from sfetcas.errors import SceneError, SolveError
-from sfetcas.pages.page import LIVE_SHARE, page_of
+from sfetcas.pages.page import page_of
 from sfetcas.reports import report
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -154,7 +154,7 @@ def _save(figure: Figure, file: Path) -> None:
 
 def _turn(answer: Any, file: Path, source: str, said: str | None = None) -> None:
     live = file.stem in LIVE
-    text = page_of(answer, source, said, live=live, most=LIVE_SHARE * MOST_STATES if live else MOST_STATES)
+    text = page_of(answer, source, said, live=live, most=MOST_STATES)
     (TURNING / f"{file.stem}.html").write_text(text, encoding="utf-8")
 
 

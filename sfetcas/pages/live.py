@@ -7,6 +7,7 @@ The same C as of :func:`sfetcas.export`, with a few functions that a page can ca
 from __future__ import annotations
 
 import base64
+import gzip
 import importlib.util
 import json
 import os
@@ -101,18 +102,18 @@ def live_of(
     Returns
     -------
     dict
-        ``module``, base64; ``arguments``, ``results`` and ``statuses`` as of the manifest of an export; ``handles``:
-        which of the arguments are forces and displacements of nodes that can be dragged; ``factor`` of the scene where
-        that is no argument; ``tangents`` of the undeformed flexible members at their places, by their names;
-        ``bodies``: the ``rest`` places of members that are curved and do not bend, and the ``node`` they turn with.  Of
-        a motion ``step``, s, the ``times`` within a step at which arguments are needed, and the ``histories`` by the
-        names of their arguments.
+        ``module``, zipped, base64; ``arguments``, ``results`` and ``statuses`` as of the manifest of an export;
+        ``handles``: which of the arguments are forces and displacements of nodes that can be dragged; ``factor`` of the
+        scene where that is no argument; ``tangents`` of the undeformed flexible members at their places, by their
+        names; ``bodies``: the ``rest`` places of members that are curved and do not bend, and the ``node`` they turn
+        with.  Of a motion ``step``, s, the ``times`` within a step at which arguments are needed, and the ``histories``
+        by the names of their arguments.
 
     Raises
     ------
     SceneError
         As :func:`sfetcas.export`; there is no compiler, or it fails; no node tells how a curved rigid member in space
-        turns.  :func:`check_live` has to accept the scene.
+        turns; steps are shorter than any that is taken.  :func:`check_live` has to accept the scene.
     """
     flexible = {name: x for name, x in places.items() if scene.members[name].type == "flexible"}
     moving = scene.analysis.type == "dynamic"
@@ -128,6 +129,9 @@ def live_of(
         (folder / "glue.c").write_text(glue, encoding="utf-8")
         module = _compiled(folder, re.findall(r"(live_\w+)\([^()]*\) \{", glue))
     assert isinstance(made, EquilibriumSolver | TimeStep)
+    if isinstance(made, TimeStep) and made.usual < made.shortest:
+        message = f"found {made.usual:g} s, accepted of a live page: at least {made.shortest:.2g} s"
+        raise SceneError(message, ("analysis", "step"))
     offered = {one.name: _spans(scene, one) for one in made.arguments.arguments}
     if scene.analysis.range:
         # A path need not come to the factor of its loads.
@@ -137,7 +141,7 @@ def live_of(
                 one["default"] = min(max(one["default"], low), high)
     tangents = {name: scene.center_lines[name].tangents(x).ravel().tolist() for name, x in flexible.items()}
     found = {
-        "module": base64.b64encode(module).decode(),
+        "module": base64.b64encode(gzip.compress(module, mtime=0)).decode(),
         "arguments": [
             {key: one[key] for key in ("name", "unit", "first", "size", "default")} | {"spans": offered[one["name"]]}
             for one in manifest["arguments"]

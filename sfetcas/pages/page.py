@@ -22,7 +22,7 @@ from ..pictures.files import check_ending
 from .content import MOST_STATES, Shown, content_of
 from .live import check_live, live_of
 
-__all__ = ["ENDINGS", "LIVE_SHARE", "View", "page_of", "save_page"]
+__all__ = ["ENDINGS", "View", "page_of", "save_page"]
 
 PARTS = File(__file__).parent
 HEIGHT = 560
@@ -30,8 +30,6 @@ HEIGHT = 560
 
 LIVE_PART = "  /* On live pages the text of live.js stands here. */\n"
 
-LIVE_SHARE = 3
-"""Of so many states of a path or a motion a live page has one."""
 
 ENDINGS = (".html", ".htm")
 """Endings of the files that pages are written to."""
@@ -80,7 +78,7 @@ def page_of(
         source = json.dumps(answer.scene.to_dict(), indent=2, ensure_ascii=False)
     said = repr(answer) if said is None else said
     # The solver takes most of the room, and makes states of its own.
-    found = content_of(answer, source, said, most=most // LIVE_SHARE if live else most)
+    found = content_of(answer, source, said, most=most)
     if live:
         places = {member["name"]: np.array(member["x"]) for member in found["members"]}
         found["live"] = live_of(answer.scene, places, arguments, settings)

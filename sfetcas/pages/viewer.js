@@ -1,6 +1,6 @@
 "use strict";
 /* Draws the answer that the page holds: members by WebGL, symbols and numbers over them, charts and tables beside. */
-(() => {
+(async () => {
   const $ = (id) => document.getElementById(id);
   const data = JSON.parse($("content").textContent);
   const { states, members, quantities } = data;
@@ -21,8 +21,9 @@
 
   // -- what the page holds --------------------------------------------------------------------------------------------
 
+  const bytesOf = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const unpack = (text) => {
-    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    const bytes = bytesOf(text);
     return data.bits === 64 ? new Float64Array(bytes.buffer) : new Float32Array(bytes.buffer);
   };
   const kept = new Map();
@@ -881,7 +882,7 @@
   // -- the solver itself ----------------------------------------------------------------------------------------------
 
   /* On live pages the text of live.js stands here. */
-  const live = data.live ? withSolver(data.live) : null;
+  const live = data.live ? withSolver(data.live, await unzipped(data.live.module)) : null;
 
   // -- begin ----------------------------------------------------------------------------------------------------------
 

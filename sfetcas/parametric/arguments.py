@@ -617,7 +617,7 @@ class Arguments:
         }
         self.idle = self._check(symbolic)
         if needed:
-            refuse_idle(self.idle)
+            refuse_idle(self.idle, moving=scene.analysis.type == "dynamic")
         self.program = Program(self.expressions, self._varying(), prefix=prefix)
 
     @property
@@ -827,8 +827,8 @@ def limits_of(arguments: Sequence[Argument]) -> Array:
     return np.concatenate([np.zeros((0, 2)), *(one.limits for one in arguments)]).T
 
 
-def refuse_idle(names: Sequence[str]) -> None:
-    """Refuse numbers on which nothing depends.
+def refuse_idle(names: Sequence[str], *, moving: bool = False) -> None:
+    """Refuse numbers on which nothing depends, in the equations of a motion with ``moving``.
 
     Raises
     ------
@@ -836,7 +836,9 @@ def refuse_idle(names: Sequence[str]) -> None:
         Names the first.
     """
     if names:
-        message = "found a number on which nothing depends, accepted: one that the equilibrium depends on"
+        accepted = "loads, motions, stiffness" if moving else "one that the equilibrium depends on"
+        where = " in the steps of a motion" if moving else ""
+        message = f"found a number on which nothing depends{where}, accepted: {accepted}"
         if names[0].startswith("contacts."):
             message += ", as of what touches with the numbers of the scene"
         raise SceneError(message, ("arguments", names[0]))
