@@ -392,7 +392,10 @@ def test_a_node_that_a_history_moves_is_given_back(opened):
         {
             "gravity": [0, -1],
             "sections": {"s": {"EI3": 1.0, "rhoA": 1.0, "damping": 0.05}},
-            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+            "nodes": {
+                "A": {"position": [0, 0], "support": "clamped"},
+                "B": {"position": [1, 0], "support": "slider", "direction": [1, 0], "rotation": "hinge"},
+            },
             "members": {"m": {"nodes": ["A", "B"], "section": "s", "elements": 4}},
             "histories": {"h": {"t": [0, 1, 2, 4], "value": [0, 1, 0, 0], "interpolation": "spline"}},
             "motions": {
@@ -413,6 +416,8 @@ def test_a_node_that_a_history_moves_is_given_back(opened):
     page.until("Math.abs(sfetcas.at({node: 'A'})[1]) < 1e-9")
     stopped(page)
     assert page.window.locator("#number-1").input_value() == "0"
+    # The guide holds it there.
+    assert 0.0 < float(re.search(r"closings met to ([\d.e+-]+),", told(page))[1]) < 1e-9
 
 
 def test_a_motion_that_cannot_go_on_says_why(opened, swinging):

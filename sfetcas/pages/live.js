@@ -256,7 +256,7 @@
     function ofMotion() {
       const h = given.step;
       // Arguments go to what is wanted within the steps of a frame: where nodes jump, velocities would not be finite.
-      let now = [...defaults], wanted = [...defaults], gone = 0, able = Infinity, time = 0, running = 0, spare = 0, speed = 1, status = DONE;
+      let now = [...defaults], wanted = [...defaults], gone = 0, able = Infinity, time = 0, running = 0, spare = 0, speed = 1, status = DONE, gap = 0;
       // Histories that a slider has taken over, and those of them that go back to their course.
       let taken = new Set(), returning = new Set();
       const driven = given.arguments.filter((one) => given.histories[one.name]).map((one) => [one.first, given.histories[one.name]]);
@@ -275,7 +275,7 @@
       const step = (length, from, to, halvings) => {
         given.times.forEach((share, k) => inputs.set(valuesAt(time + share * length, from + share * (to - from)), k * count));
         status = timed(() => code.live_step_now(length));
-        if (status === DONE) [time, gone] = [time + length, to];
+        if (status === DONE) [time, gone, gap] = [time + length, to, report.getFloat64(8, true)];
         else if (halvings) {
           const middle = 0.5 * (from + to);
           if (step(0.5 * length, from, middle, halvings - 1) === DONE) step(0.5 * length, middle, to, halvings - 1);
@@ -310,7 +310,8 @@
         Object.assign(here, { at: time, lines, values: null, told: tabled({ time }), stable: null, text: `live: time ${short(time)} s` });
         carry();
         showFields(wanted);
-        say(status === DONE ? `Time ${short(time)} s, ${running ? "running" : "stopped"}` : `Stopped at ${short(time)} s: ${sentences[status]}`, status);
+        const closed = gap > 0 ? `closings met to ${gap.toExponential(1)}, ` : "";
+        say(status === DONE ? `Time ${short(time)} s, ${closed}${running ? "running" : "stopped"}` : `Stopped at ${short(time)} s: ${sentences[status]}`, status);
         footer("steps");
       };
       const pause = () => {
@@ -347,7 +348,7 @@
       };
       const restart = () => {
         code.live_start();
-        [wanted, time, spare, status, taken, returning] = [[...defaults], 0, 0, DONE, new Set(), new Set()];
+        [wanted, time, gap, spare, status, taken, returning] = [[...defaults], 0, 0, 0, DONE, new Set(), new Set()];
         now = [...wanted];
         inputs.set(now);
         code.live_tell_now();
