@@ -106,7 +106,7 @@ def test_energies_of_steps(name):
     model = assemble(made.arguments.scene_at(p), made.model.mesh, assembly="nodal", scales=scales)
     own = StageEquations(Equations(model), masses_of(model), "interpreted")
     q = parts["q"].reshape(made.system.layout.rotations, -1)
-    still = State(q, parts["y"], np.zeros(0), parts["near"])
+    still = State(q, parts["y"], parts["lam"], parts["near"])
     point = own.equations.at(still, own.loading(own.factors(0.0)))
     assert elastic == pytest.approx(point.strain * scales.moment, rel=1e-10)
     assert loads == pytest.approx((point.potential - point.strain) * scales.moment, rel=1e-10, abs=1e-14)
