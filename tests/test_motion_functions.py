@@ -1,12 +1,14 @@
 """The equations of motion as plain functions: against the simulation, and against each other."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
 from sfetcas import (
+    Analysis,
     CrossSection,
     History,
     Load,
@@ -15,11 +17,14 @@ from sfetcas import (
     Scene,
     SceneError,
     Spring,
+    Tendon,
+    load,
     motion_functions,
     respond,
     uniform_mesh,
 )
 
+PROBLEMS = Path(__file__).parent.parent / "problems"
 SECTION = CrossSection(EI3=1.0, EI2=1.5, GJ=0.7, rhoA=1.0, rhoI=[3e-2, 1e-2, 2e-2], damping=0.01)
 
 
@@ -132,6 +137,7 @@ def test_parameters_are_arguments():
     [
         ({"inputs": ["loads.motor.valeu"]}, "did you mean 'value'"),
         ({"outputs": ["nodes.tpi.position"]}, "tpi"),
+        ({"outputs": ["reactions.hub.force"]}, "outputs.reactions.hub.force: found what constraints or inertia exert"),
         ({"inputs": ["sections.strip.EI3"]}, "accepted: a component of the value of a load"),
         ({"parameters": ["sections.strip.rhoA"]}, "found numbers that change masses"),
         ({"parameters": ["members.arm.elements"]}, "members.arm.elements"),
@@ -147,3 +153,21 @@ def test_what_turns_without_inertia_is_refused():
     thin = arm("space").replace(sections={"strip": SECTION.replace(rhoI=None)})
     with pytest.raises(SceneError, match="found rotations without inertia"):
         motion_functions(thin, ["loads.motor.value.2"])
+
+
+def test_what_the_multiplier_of_a_constraint_tells_is_no_output():
+    """The tension of a tendon of a given length, which was told as zero."""
+    tied = arm().replace(
+        tendons={"stay": Tendon(way=[{"ground": [0, 1]}, {"node": "tip"}], length=2.0**0.5, pushes=True)},
+        analysis=Analysis(type="dynamic", end=1.0, initial="equilibrium"),
+    )
+    with pytest.raises(SceneError, match=r"^outputs.tendons.stay.tension: found what constraints or inertia exert"):
+        motion_functions(tied, outputs=["tendons.stay.tension"])
+
+
+def test_where_nothing_turns_the_functions_are_those_of_what_moves():
+    bead = load(PROBLEMS / "bead_on_circular_wire.toml")
+    functions = motion_functions(bead, outputs=["nodes.bead.position"])
+    assert np.array(functions.outputs_of(functions.begin, [], [])).ravel() == pytest.approx(
+        bead.nodes["bead"].position, abs=1e-12
+    )

@@ -131,6 +131,33 @@ def test_what_is_asked_wrongly_is_refused():
         problem.integral(ca.MX.sym("stranger"))
 
 
+def test_reactions_are_bounded_along_the_way():
+    """Of the rigid arm: without a bound those of the closed form, then as large as allowed."""
+
+    def hub(bound):
+        problem = turning(arm(0), intervals=20)
+        force = problem.answer("reactions.hub.force")
+        problem.subject_to(-bound <= (force <= bound), name="bearing")
+        return solved(problem)
+
+    free = hub(10.0)
+    share = free.times[1:] / TIME
+    angle, speed = ANGLE * (3.0 * share**2 - 2.0 * share**3), 6.0 * ANGLE / TIME * (share - share**2)
+    faster = 6.0 * ANGLE / TIME**2 * (1.0 - 2.0 * share)
+    # The first moment of mass about the hub; accelerations in 20 intervals err by their square.
+    wanted = 0.7 * (faster * [-np.sin(angle), np.cos(angle)] - speed**2 * [np.cos(angle), np.sin(angle)]).T
+    told = free.answer("reactions.hub.force")
+    assert np.isnan(told[0, :2]).all()
+    assert told[1:, :2] == pytest.approx(wanted, abs=0.01 * np.abs(wanted).max())
+    eased = hub(0.8 * np.abs(wanted).max())
+    assert np.abs(eased.answer("reactions.hub.force")[1:]).max() == pytest.approx(0.8 * np.abs(wanted).max(), rel=1e-3)
+    assert eased.cost > free.cost
+    problem = turning(arm(0))
+    problem.subject_to(problem.at_t0(problem.answer("reactions.hub.force")) == 0.0)
+    with pytest.raises(SceneError, match=r"^answer.reactions.hub.force: found what .* exert, which is not known at t0"):
+        solved(problem)
+
+
 def test_a_constraint_that_nothing_changes_and_does_not_hold_is_refused():
     problem = turning(arm())
     # In a plane scene z of the tip is 0 at all times.

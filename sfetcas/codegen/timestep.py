@@ -35,7 +35,7 @@ from ..mechanics.spots import spots_of
 from ..mechanics.unilateral import rows_of
 from ..parametric.arguments import Arguments, Asked, asked_for, in_words
 from ..parametric.equilibrium import Place, chosen_places
-from ..parametric.moving import ParametricStages, answers_of_motion, motion_of, parametric_stages
+from ..parametric.moving import ParametricStages, answers_of_motion, forces_are_unique, motion_of, parametric_stages
 from ..parametric.results import Results, default_motion_results
 
 __all__ = ["TimeStep", "time_step"]
@@ -163,11 +163,13 @@ class TimeStep:
         state, p = ca.MX.sym("state", len(self.begin)), ca.MX.sym("arguments", layout.factors)
         bounds = np.cumsum([0, *self.sizes.values()]).tolist()
         parts = dict(zip(self.sizes, ca.vertsplit(state, bounds), strict=True))
-        velocity = ca.reshape(parts["rates"], layout.x, self.method.kept)[:, 0]
+        rates = ca.reshape(parts["rates"], layout.x, self.method.kept)
+        # Nothing hangs on it where the method knows none.
+        velocity, acceleration = rates[:, 0], rates[:, self.method.acceleration]
         angles = parts["near"][: self.model.unwrapping.count]
         still = ca.vertcat(parts["q"], parts["y"], parts["lam"], angles)
         outputs = answers_of_motion(self.results, self.arguments, self.system, self.time)
-        as_given = outputs(still, p, velocity)
+        as_given = outputs(still, p, velocity, acceleration)
         return ca.Function(
             f"{self.name}_results", [state, p], [ca.densify(as_given)], ["state", "arguments"], ["results"]
         )
@@ -250,20 +252,24 @@ def time_step(
     mesh = replace(mesh, spots=spots_of(scene, mesh)) if scene.contacts else mesh
     base = assemble(scene, mesh, assembly="nodal")
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
-    outputs = Results(base, results or default_motion_results(base), chosen_places(members, places or {}), motion=True)
+    own = StageEquations(Equations(base), masses_of(base), "interpreted", unilateral=rows_of(base))
+    mover = Mover(own.equations, Inertia(own), own.masses.time, own.factors)
+    # Velocities are those that nothing stops.
+    begun, _ = simulation.begun(own, mover.free if len(own.unilateral) else None)
+    state, loading = begun.state, own.loading(own.factors(0.0))
+    unique = forces_are_unique(own, state)
+    names = results or default_motion_results(base, forces=unique and _tells_forces(method))
+    outputs = Results(base, names, chosen_places(members, places or {}), motion=True, unique=unique)
+    if outputs.by_inertia:
+        method = _accelerating(method, outputs.by_inertia[0])
     asked = asked_for(scene, arguments)
     for one in asked:
         if IMPACT.fullmatch(one.name):
             raise SceneError("found what impacts have of the scene, accepted: another number", ("arguments", one.name))
     known = Arguments(scene, base, asked, outputs, f"{name}_")
-    own = StageEquations(Equations(base), masses_of(base), "interpreted", unilateral=rows_of(base))
     system = parametric_stages(known, own.masses, own.unilateral)
-    # Velocities are those that nothing stops.
-    free = Mover(own.equations, Inertia(own), own.masses.time, own.factors).free if len(own.unilateral) else None
-    begun, _ = simulation.begun(own, free)
     rates = np.zeros((method.kept, len(begun.x)))
     rates[0] = begun.v
-    state = begun.state
     given = state.q, state.y, state.lam, begun.x, rates, state.unwrapped
     memory = Memory(0.0, *given, acting=begun.touching, held=0.0 * begun.touching)
     if method.kept > 1 or base.segments.pulled:
@@ -271,6 +277,10 @@ def time_step(
         # How tendons pull at once is asked of a method that knows which rows act.
         stepper = Stepper(own, Radau(2) if isinstance(method, Impulsive) else method)
         memory = stepper.refreshed(memory, step / own.masses.time)
+    if outputs.by_inertia:
+        free, (v, *_), a = replace(state, lam=0.0 * state.lam), memory.rates, memory.rates[method.acceleration]
+        forces = mover.inertia.loading(own.equations, free, own.equations.effective(free, loading), v, a)
+        memory = replace(memory, lam=mover.balanced(own.equations, free, forces).lam)
     stages, layout = method.stages, system.layout
     still = np.zeros(system.turns * layout.rotations * stages + layout.y * stages)
     moved = [memory.q.ravel(), memory.y, memory.lam, still, memory.x, memory.rates.ravel(), memory.unwrapped]
@@ -281,6 +291,23 @@ def time_step(
     if made.by_core is not None and np.isnan(made.step(made.begin, made.usual)).any():
         simulation.refuse_unresisted(own, begun)
     return made
+
+
+def _tells_forces(method: Method) -> bool:
+    """Whether steps of a method can tell what forces of inertia have a share in."""
+    return isinstance(method, Radau) or method.acceleration > 0
+
+
+def _accelerating(method: Method, name: str) -> Method:
+    """The method that keeps accelerations; SceneError, for a result of a name, if it knows none."""
+    if not _tells_forces(method):
+        accepted = ", ".join(
+            n for n, one in INTEGRATORS.items() if _tells_forces(getattr(one, "keywords", {}).get("method", method))
+        )
+        raise SceneError(
+            f"found steps of {method.name!r}, which do not tell it, accepted: {accepted}", ("results", name)
+        )
+    return Radau(method.stages, accelerating=True) if isinstance(method, Radau) else method
 
 
 def _method(simulation: Simulation) -> Method:

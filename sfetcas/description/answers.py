@@ -151,8 +151,8 @@ nodes.NAME.quaternion | | w x y z | all | rotation since the undeformed scene, w
 nodes.NAME.angle | rad | | all | the same in the plane, counting turns
 nodes.NAME.velocity | m/s | x y z | motion, steps | of the node
 nodes.NAME.angular_velocity | rad/s | x y z | motion | of the node, where it has a rotation of its own
-reactions.NAME.force | N | x y z | statics, motion, parameters | at a supported node: what the ground does
-reactions.NAME.moment | N m | x y z | statics, motion, parameters | the same about the node
+reactions.NAME.force | N | x y z | all | at a supported node: what the ground does
+reactions.NAME.moment | N m | x y z | all | the same about the node
 members.NAME.position at | m | x y z | all | of the centre line
 members.NAME.quaternion at | | w x y z | all | rotation of the sections since the undeformed scene
 members.NAME.angle at | rad | | all | the same in the plane, counting turns
@@ -189,8 +189,8 @@ tubes.NAME.moment at | N m | b1 b2 b3 | statics, motion | its own torque (b1) an
 rings.NAME.at | | | all | fraction of the length of its member
 rings.NAME.force | N | x y z | all | of the ring on its member
 rings.NAME.drive | N | | all | of what moves one with a `travel`, towards the second node of the member
-motions.NAME.moment | N m | x y z | statics, motion, parameters | what makes a rotation; a number where that is one
-motions.NAME.force | N | x y z | statics, motion, parameters | what makes a displacement; a number at a driven joint
+motions.NAME.moment | N m | x y z | all | what makes a rotation; a number where that is one
+motions.NAME.force | N | x y z | all | what makes a displacement; a number at a driven joint
 magnets.NAME.energy | J | | statics, motion, parameters | minus the moment times the field, summed along members
 magnets.NAME.torque | N m | x y z | statics, motion, parameters | of the fields, about the places of the magnet
 magnets.NAME.force | N | x y z | statics, motion, parameters | of fields that are not uniform

@@ -83,6 +83,8 @@ class IndexOne:
         system, n = self.system, self.system.layout
         columns = self.turning.tolist()
         spin, faster = (system.spins(part)[:, columns] for part in (w, a))
+        if not columns:
+            return ca.MX(0, 1), ca.MX(0, 1)
         q = ca.reshape(q, n.components, len(columns))
         first, second = _turning(system.model.space).map(len(columns))(q, spin, faster)
         return ca.vec(first), ca.vec(second)

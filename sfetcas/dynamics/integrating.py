@@ -212,7 +212,8 @@ class Stepper:
         missed = memory.rates[0] * short.h - (slopes @ values)[0]
         second = (slopes @ slopes @ values)[0] + missed * _bend(nodes)
         acceleration = second / short.h**2
-        return self._told(replace(fresh, rates=np.stack([memory.rates[0], acceleration, acceleration])), short)
+        rates = np.stack([memory.rates[0], *[acceleration] * (self.method.kept - 1)])
+        return self._told(replace(fresh, rates=rates), short)
 
     @functools.cached_property
     def starter(self) -> Stepper:

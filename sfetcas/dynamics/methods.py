@@ -69,6 +69,8 @@ class Method(abc.ABC):
         Fractions of the step at which loads and motions are evaluated; those of the stages come last.
     kept : int
         Number of rates that are passed from step to step: the velocity first.
+    acceleration : int
+        Which of these is the acceleration that the equations have at the end of the step; 0 if none.
     gain : float
         Steps chosen by the error of ``(gain accuracy)**(order of that error / order)`` give some three times the
         accuracy at the end (measured): what a finer run, which follows, confirms.
@@ -81,6 +83,7 @@ class Method(abc.ABC):
     places: Array
     loaded: Array
     kept: int
+    acceleration: int = 0
     gain: float = 3.0
     polished: bool = False
 
@@ -152,28 +155,34 @@ class StageMethod(Method):
 
 @final
 class Radau(StageMethod):
-    """Radau IIA collocation with two or three stages: order 3 or 5, L-stable."""
+    """Radau IIA collocation with two or three stages: order 3 or 5, L-stable.
 
-    kept = 1
+    With ``accelerating`` the acceleration at the end of a step is kept beside the velocity: no step needs it, but what
+    tells forces does.
+    """
 
-    def __init__(self, stages: int) -> None:
+    def __init__(self, stages: int, *, accelerating: bool = False) -> None:
         self.name, self.order = f"radau-{stages}", 2 * stages - 1
         self.places = self.loaded = RADAU[stages]
         self.gain = 3.0 if stages == 2 else 20.0
+        self.acceleration = int(accelerating)
+        self.kept = 1 + self.acceleration
 
     @functools.cached_property
     def relations(self) -> Relations:
         """Derivatives of the collocation polynomials at the stages."""
-        slopes = np.linalg.inv(integration(self.places, self.places))
+        slopes, kept = np.linalg.inv(integration(self.places, self.places)), self.kept
         # The polynomials of X are those of X - X_0; the polynomials of X' have the velocity at the begin.
+        second, begun = slopes @ slopes, np.zeros((self.stages, kept))
+        begun[:, 0] = -slopes.sum(axis=1)
         return Relations(
             velocity=slopes,
-            acceleration=slopes @ slopes,
-            after=slopes[-1:],
-            velocity_kept=np.zeros((self.stages, 1)),
-            acceleration_kept=-slopes.sum(axis=1, keepdims=True),
-            after_kept=np.zeros((1, 1)),
-            powers=np.array([1]),
+            acceleration=second,
+            after=np.stack([slopes[-1], second[-1]])[:kept],
+            velocity_kept=np.zeros((self.stages, kept)),
+            acceleration_kept=begun,
+            after_kept=np.stack([np.zeros(kept), begun[-1]])[:kept],
+            powers=np.array([1, 2])[:kept],
         )
 
 
@@ -189,6 +198,7 @@ class GeneralisedAlpha(StageMethod):
     """Generalised-alpha: order 2, one stage; ``damping`` is the spectral radius at infinite frequency, from 0 to 1."""
 
     kept = 3
+    acceleration = 2
     order = 2
     places = loaded = np.array([1.0])
     name = "generalised-alpha"

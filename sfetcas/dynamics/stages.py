@@ -17,6 +17,7 @@ damping on all of them.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable, Iterator
 
 import casadi as ca
 import numpy as np
@@ -27,7 +28,7 @@ from ..mathematics.linear import pattern, places_of
 from ..mechanics.expressions import Given, moved_by
 from ..mechanics.stationarity import Forces, Stationarity, summed
 from ..mechanics.tables import Pattern
-from ..mechanics.terms import rotation_gradient
+from ..mechanics.terms import Term, rotation_forces, rotation_gradient
 from .system import System
 
 __all__ = ["DUAL_REGULARISATION", "StageEquations", "solution"]
@@ -149,6 +150,37 @@ class StageEquations(System):
         mass = self.coupling_matrix(resting, 0.0, 1.0)[:unknowns, :unknowns]
         return rows, mass, (moving.residual - resting.residual)[:unknowns]
 
+    def further(self, forces: ca.MX) -> Forces:
+        """Inertia and damping forces (quantities,) of what is linear, as forces on places and pulls along elements."""
+        linear = forces[: self.linear]
+        return Forces(times(self.by_place.T, linear), times(self.by_tangent.T, linear))
+
+    def pushed(
+        self, function: Callable[[Term], ca.Function], q: ca.MX, places: ca.MX, unwrapped: ca.MX, forces: ca.MX
+    ) -> Iterator[tuple[Index, list[ca.MX]]]:
+        """Of each group of observables its sides, and a function of its kind at forces (quantities,) on its values."""
+        observables = zip(self.masses.observables, self.observed, self.ranges, strict=True)
+        for group, sides, (begin, end) in observables:
+            n = len(group.data)
+            own = ca.reshape(forces[begin:end], group.kind.sizes[2], n)
+            data = *self.sides(group, q, places), self.seen_data(group, unwrapped)
+            yield sides, list(self.many(function(group.kind), n)(*data, ca.MX(0, n), own))
+
+    def balance(
+        self, q: ca.MX, y: ca.MX, lam: ca.MX, forces: ca.MX, given: Given, unwrapped: ca.MX
+    ) -> tuple[Stationarity, ca.MX]:
+        """The equations of statics at a state with inertia and damping forces (quantities,), and of these forces what
+        observables take from rotations and places, in full coordinates.
+        """
+        places, rows = self.displacements(q, y, given), self.tables.of_rows
+        static = Stationarity(self, q, y, lam, given, unwrapped, self.further(forces), entries=False)
+        taken = ca.MX(rows, 1)
+        for sides, (_, acting) in self.pushed(rotation_forces, q, places, unwrapped, forces):
+            flat = sides.ravel()
+            used = np.flatnonzero((flat >= 0) & (flat < rows))
+            taken += times(sparse(flat[used], used, np.ones(len(used)), (rows, len(flat))), ca.vec(acting))
+        return static, taken
+
     @functools.cached_property
     def entry_places(self) -> StagePlaces:
         """Positions of its matrix entries."""
@@ -257,19 +289,12 @@ class _Stage:
         self._system = system
         lam = system.switched(lam, unwrapped)
         # What acts along the elements: loads, internal forces, inertia.
-        linear = forces[: system.linear]
-        further = Forces(times(system.by_place.T, linear), times(system.by_tangent.T, linear))
         places = system.displacements(q, y, given)
-        static = Stationarity(system, q, y, lam, given, unwrapped, further)
+        static = Stationarity(system, q, y, lam, given, unwrapped, system.further(forces))
         entries, shares = static.entries, []
         self._rotation_jacobian = static.rotation_jacobian[:, system.massive_columns]
         self._rotation_jacobians = []
-        observables = zip(system.masses.observables, system.observed, system.ranges, strict=True)
-        for observed, sides, (begin, end) in observables:
-            n, count = len(observed.data), observed.kind.sizes[2]
-            own = ca.reshape(forces[begin:end], count, n)
-            data = *system.sides(observed, q, places), system.seen_data(observed, unwrapped)
-            found = system.many(rotation_gradient(observed.kind), n)(*data, ca.MX(0, n), own)
+        for sides, found in system.pushed(rotation_gradient, q, places, unwrapped, forces):
             shares.append((sides, found[3]))
             entries.append(ca.vec(found[4]))
             self._rotation_jacobians.append(found[5])

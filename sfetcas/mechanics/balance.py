@@ -18,6 +18,7 @@ from .batches import GroupBatch
 from .connections import connections_of, row_of
 from .equations import Equations, State
 from .loading import Loading
+from .reactions import shares_rotation
 from .segments import SIDES, elongation_of
 from .tendon_chains import part_of
 from .terms import answers_of
@@ -103,7 +104,7 @@ class Balance:
         """Force (3,) and moment about the node (3,) that the ground exerts on it."""
         moments, forces = self._left
         force = self._reactions.pushed(node) @ forces[self.model.segments.place(node)]
-        if self._reactions.shared(node):
+        if shares_rotation(self.model, node):
             return force, self._rigid.get(("node", node), np.zeros(3))
         return force, sum((fixed @ moments[turn] for turn, fixed in self._reactions.turned(node)), np.zeros(3))
 

@@ -23,11 +23,12 @@ from ..mathematics.arrays import Array, Index, unit
 from ..mathematics.linear import SparseMap, smallest
 from .connections import connections_of
 from .load_terms import inner_cut
+from .model import Model
 from .rotations import STIFF, RotationFreedom, end_joints
 from .tables import Tables
 from .terms import GROUND
 
-__all__ = ["Reactions", "RigidBalance"]
+__all__ = ["Reactions", "RigidBalance", "shares_rotation"]
 
 INNER_WEIGHT = 1e-8
 """Weight of moments inside rigid members where reactions count 1: reactions are made small first."""
@@ -172,14 +173,6 @@ class Reactions:
         # A member that is rigid up to another support that holds it is held there.
         elsewhere = {turn for n, turn in rotations.node_turn.items() if scene.nodes[n].turn not in FREE}
         return [turn for turn in turns if turn not in elsewhere]
-
-    def shared(self, node: str) -> bool:
-        """Whether another support restrains the rotation of a node as well, so that :attr:`rigid` is needed."""
-        number, nodes = self.model.rotations.node_turn[node], self.model.scene.nodes
-        if number is None:
-            return False
-        every = self.model.rotations.node_turn.items()
-        return any(turn == number and other != node and nodes[other].turn not in FREE for other, turn in every)
 
     # -- rigid members ----------------------------------------------------------------------------
 
@@ -366,6 +359,15 @@ class Reactions:
             found += [cell for k in range(self.model.element.order + 1) for cell in self._on_element(e, k)]
             found += [self._beside(places + e), *(self._cell(*term) for term in self._within.get(e, ()))]
         return found
+
+
+def shares_rotation(model: Model, node: str) -> bool:
+    """Whether another support restrains the rotation of a node as well, so that :attr:`Reactions.rigid` is needed."""
+    number, nodes = model.rotations.node_turn[node], model.scene.nodes
+    if number is None:
+        return False
+    every = model.rotations.node_turn.items()
+    return any(turn == number and other != node and nodes[other].turn not in FREE for other, turn in every)
 
 
 def _map(parts: list[Entries], shape: tuple[int, int]) -> SparseMap:

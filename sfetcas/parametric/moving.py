@@ -16,15 +16,18 @@ from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mathematics.kernels import Direct
+from ..mechanics.equations import State
 from ..mechanics.expressions import Given
 from ..mechanics.inputs import Inputs
 from ..mechanics.masses import Masses, masses_of
+from ..mechanics.terms import Term, rows_of
 from ..mechanics.unilateral import NONE, UnilateralRows
+from ..solvers.redundancy import loose_rows
 from .arguments import Arguments
 from .equilibrium import refuse_search
 from .results import Moving, Results
 
-__all__ = ["ParametricStages", "answers_of_motion", "motion_of", "parametric_stages"]
+__all__ = ["ParametricStages", "answers_of_motion", "forces_are_unique", "motion_of", "parametric_stages"]
 
 
 class ParametricStages(StageEquations):
@@ -93,29 +96,48 @@ def parametric_stages(arguments: Arguments, masses: Masses, unilateral: Unilater
     return ParametricStages(arguments, found, unilateral)
 
 
-def answers_of_motion(results: Results, arguments: Arguments, system: ParametricStages, time: float) -> ca.Function:
-    """A function ``(state, numbers, rates) -> results``.
+def forces_are_unique(system: StageEquations, state: State) -> bool:
+    """Whether reactions are unique at the first state of a motion: not where constraints depend on each other."""
+    equations = system.equations
+    return not loose_rows(equations, equations.at(state, system.loading(system.factors(0.0)))).size
 
-    ``state`` has rotations, displacements, multipliers and turn-counting angles, ``rates`` those of the quantities that
-    carry mass; ``time`` is the unit of time, s.
+
+def answers_of_motion(results: Results, arguments: Arguments, system: ParametricStages, time: float) -> ca.Function:
+    """A function ``(state, numbers, rates, accelerations) -> results``.
+
+    ``state`` has rotations, displacements, multipliers and turn-counting angles, ``rates`` and ``accelerations`` are
+    those of the quantities that carry mass; ``time`` is the unit of time, s.  Accelerations are without effect but on
+    :attr:`.Results.by_inertia`.
     """
     layout, program = system.layout, arguments.program
     state, p, rates = ca.MX.sym("state", program.states), ca.MX.sym("numbers", layout.factors), ca.MX.sym("v", layout.x)
+    accelerations = ca.MX.sym("a", layout.x)
     places = ca.reshape(rates[: system.axes * system.places], system.axes, system.places)
     speeds = places * (arguments.model.scales.length / time)
     kinetic = 0.5 * ca.dot(rates, system.forces(ca.MX.zeros(rates.shape), rates))
-    outputs = results.expression(program, arguments.undeformed(p), Moving(speeds, kinetic))
+    q, y, lam, unwrapped = program.parts
+    balance = system.balance(q, y, lam, system.forces(rates, accelerations), program.given, unwrapped)
+    outputs = results.expression(program, arguments.undeformed(p), Moving(speeds, kinetic, *balance))
     as_given = ca.substitute([outputs], [program.state_symbol, program.symbol], [state, arguments.given(p)])[0]
-    return ca.Function("answers", [state, p, rates], [ca.densify(as_given)], ["state", "numbers", "v"], ["results"])
+    given = {"state": state, "numbers": p, "v": rates, "a": accelerations}
+    return ca.Function("answers", list(given.values()), [ca.densify(as_given)], list(given), ["results"])
 
 
 def _same(one: Masses, other: Masses) -> bool:
     """Whether two models have the same masses."""
     pairs = [(one.inner, other.inner), (one.inner_drag, other.inner_drag), (one.place_drag, other.place_drag)]
     pairs += [(one.places.value, other.places.value)]
-    pairs += [(a.mass, b.mass) for a, b in zip(one.observables, other.observables, strict=True)]
-    pairs += [(a.damping, b.damping) for a, b in zip(one.observables, other.observables, strict=True)]
+    both = list(zip(one.observables, other.observables, strict=True))
+    pairs += [(a.mass, b.mass) for a, b in both]
+    pairs += [(a.damping, b.damping) for a, b in both]
+    # Where masses are, as far as what is observed depends on it.
+    pairs += [(a.data[:, _felt(a.kind)], b.data[:, _felt(b.kind)]) for a, b in both]
     return all(_alike(a, b) for a, b in pairs)
+
+
+def _felt(kind: Term) -> list[int]:
+    """Which of the data of a kind its rows depend on."""
+    return sorted(set(rows_of(kind).jac_sparsity(0, 2).get_col()))
 
 
 def _alike(one: Array, other: Array) -> bool:

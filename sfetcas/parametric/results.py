@@ -28,10 +28,11 @@ from ..mechanics.load_terms import spread_of
 from ..mechanics.magnetism import magnet_terms
 from ..mechanics.mesh import ContactPoint
 from ..mechanics.model import Model
-from ..mechanics.reactions import Reactions
+from ..mechanics.reactions import Reactions, shares_rotation
 from ..mechanics.rings import up_to
 from ..mechanics.segments import SIDES, standing
 from ..mechanics.singles import fibre_strain, spin_of, turned_vector
+from ..mechanics.stationarity import Stationarity
 from ..mechanics.stations import Stations
 from ..mechanics.tendon_chains import part_of
 from ..mechanics.tendon_shares import NEWTON_STEPS, section_data, share_of, stretches_of
@@ -102,16 +103,21 @@ def default_results(model: Model, *, unique: bool = True) -> list[str]:
     return [*names, "energy.elastic", "energy.potential"]
 
 
-def default_motion_results(model: Model) -> list[str]:
+def default_motion_results(model: Model, *, forces: bool = False) -> list[str]:
     """Default results of a motion: positions, rotations and velocities of nodes, positions along members, springs,
     what obstacles do, and energies.
+
+    With ``forces`` reactions and what makes motions as well, at all nodes that share no rigid body with another one.
     """
     every = [answer_name(name) for name in default_results(model, unique=False)]
     moving = [name.text for name in every if name.kind.table == "nodes" or name.kind.key == "position"]
     sprung = [name.text for name in every if name.kind.table == "springs" and name.kind.key in TRAVELS]
     pushed = [name.text for name in every if name.kind.table == "contacts"]
     energies = [f"energy.{key}" for key in ("kinetic", "elastic", "total")]
-    return [*moving, *(f"nodes.{name}.velocity" for name in model.nodes), *sprung, *pushed, *energies]
+    held = [name for name, node in model.scene.nodes.items() if forces and node.support != "free"]
+    keys = {name: ("force",) if shares_rotation(model, name) else ("force", "moment") for name in held}
+    reactions = [f"reactions.{name}.{key}" for name, own in keys.items() for key in own]
+    return [*moving, *(f"nodes.{name}.velocity" for name in model.nodes), *sprung, *pushed, *energies, *reactions]
 
 
 TRAVELS = ("angle", "travel")
@@ -213,6 +219,11 @@ class Results:
             raise SceneError(f"found {name.text!r}, accepted: {name.bare}")
         if not self._unique and (kind.table in ("reactions", "motions") or (kind.along and kind.key in BY_FORCES)):
             raise SceneError("not unique as closings depend on each other, accepted: what is")
+        if self._motion and kind.key == "moment" and self._held(name) and shares_rotation(self.model, self._held(name)):
+            message = (
+                "found the moment of one of several supports of a rigid body, which is not told in steps, accepted:"
+            )
+            raise SceneError(f"{message} its force, or answers of solve(scene)")
         if kind.along:
             flexible = [n for n, record in scene.members.items() if record.type == "flexible"]
             if node not in flexible:
@@ -240,6 +251,18 @@ class Results:
             motion = scene.motions[node]
             if name.component is not None and single_number(motion, kind.key):
                 raise SceneError(f"found {name.bare!r}, which is one number here, accepted: {name.quantity}")
+
+    def _held(self, name: AnswerName) -> str:
+        """The node at which the ground makes what is told; empty for what members, joints and terms tell."""
+        if name.kind.table == "motions":
+            motion = self.model.scene.motions[name.record]
+            return motion.node if motion.between is None else ""
+        return name.record if name.kind.table == "reactions" else ""
+
+    @property
+    def by_inertia(self) -> list[str]:
+        """Names of the results that forces of inertia have a share in, of a motion."""
+        return [one.name for one in self.results if self._motion and self._held(one.asked)]
 
     @property
     def strung(self) -> list[str]:
@@ -397,12 +420,24 @@ class Results:
 
 
 class Moving(NamedTuple):
-    """What a motion tells beside its state: velocities of places (axes, places), m/s, and its kinetic energy,
-    dimensionless.
+    """What a motion tells beside its state.
+
+    Attributes
+    ----------
+    speeds : MX (axes, places)
+        Velocities of places, m/s.
+    kinetic : MX
+        Kinetic energy, dimensionless.
+    balance : Stationarity
+        The equations with forces of inertia and dampers.
+    taken : MX (full coordinates,)
+        What these forces take from rotations and places beside.
     """
 
     speeds: ca.MX
     kinetic: ca.MX
+    balance: Stationarity
+    taken: ca.MX
 
 
 class Outputs:
@@ -426,7 +461,7 @@ class Outputs:
         self._q, self._y, self._lam, self._unwrapped = program.parts
         places = expressions.displacements(self._q, self._y, program.given)
         self._places = ca.reshape(places, expressions.axes, expressions.places)
-        self._found = program.forces
+        self._found = program.forces if moving is None else moving.balance
         count = len(model.nodes)
         along = [len(x) for x in results.every.values()]
         curved = [results.width(name) * len(results.every[name]) for name in results.curved]
@@ -530,12 +565,14 @@ class Outputs:
     def _reaction(self, node: str, key: str) -> ca.MX:
         model, reactions, closings = self._model, self._reactions, len(self._model.positions.rows)
         left, first = times(reactions.left, self._cells), self._expressions.of_places
+        if self._moving is not None:
+            left += self._moving.taken
         if key == "force":
             on_places = left[first:] + self._found.on_places
             forces = times(reactions.forces, ca.vertcat(on_places, self._lam[:closings, :]))
             force = ca.reshape(forces, self._expressions.axes, -1)[:, model.segments.place(node)]
             return ca.mtimes(ca.DM(reactions.pushed(node)), self._three(force)).T * model.scales.force
-        if reactions.shared(node):
+        if shares_rotation(model, node):
             cells = ca.vertcat(self._cells, ca.MX(reactions.rigid.known.shape[1] - reactions.cells, 1))
             known = ("node", node) in reactions.rigid.unknowns
             found = times(reactions.rigid.share(node), cells) if known else ca.MX.zeros(3)

@@ -30,7 +30,7 @@ from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
 from ..parametric.arguments import Arguments, argument, asked_for
 from ..parametric.equilibrium import Place, chosen_places
-from ..parametric.moving import answers_of_motion, motion_of, parametric_stages
+from ..parametric.moving import answers_of_motion, forces_are_unique, motion_of, parametric_stages
 from ..parametric.results import Result, Results
 from .statement import Control, Variable
 
@@ -90,12 +90,14 @@ class ControlledSystem:
             if len(one.default) != 1:
                 accepted = ", ".join(one.names)
                 raise SceneError(f"{one.name}: found {len(one.default)} numbers, accepted: one of them, as {accepted}")
-        self.results = Results(base, list(answers), chosen_places(members, places or {}), motion=True)
-        self.arguments = Arguments(self.scene, base, known, self.results)
         own = masses_of(base)
+        stages = StageEquations(Equations(base), own, "interpreted")
+        self.begin, self.notes = simulation.begun(stages)
+        unique = forces_are_unique(stages, self.begin.state)
+        self.results = Results(base, list(answers), chosen_places(members, places or {}), motion=True, unique=unique)
+        self.arguments = Arguments(self.scene, base, known, self.results)
         self.system = parametric_stages(self.arguments, own)
         self.model, self.time = self.arguments.model, own.time
-        self.begin, self.notes = simulation.begun(StageEquations(Equations(base), own, "interpreted"))
         self.total, self.quantities = self.system.total, self.system.layout.x
 
     def _refuse(self, controls: Sequence[Control], variables: Sequence[Variable]) -> None:
@@ -212,13 +214,22 @@ class ControlledSystem:
         q, y, lam, unwrapped = self._state(s["d"], s["reference"], s["numbers"])
         found = system.stage(q, y, lam, system.forces(s["v"], s["a"]), s["numbers"], unwrapped)
         quantities = system.moving(q, y, system.given(s["numbers"]), unwrapped)
-        answers = self.outputs(ca.vertcat(ca.vec(q), y, lam, unwrapped), s["numbers"], s["v"])
+        answers = self.outputs(ca.vertcat(ca.vec(q), y, lam, unwrapped), s["numbers"], s["v"], s["a"])
         results = [ca.densify(part) for part in (found.residual, quantities, answers)]
         return ca.Function("stage", list(s.values()), results, list(s), ["balance", "quantities", "answers"])
 
+    def known_at_rates(self, name: str) -> bool:
+        """Whether rotations, displacements and velocities tell an answer, without multipliers and accelerations."""
+        results = self.results.results
+        first = sum(one.size for one in results[: [one.name for one in results].index(name)])
+        own = np.arange(first, first + self.result(name).size).tolist()
+        by_d, by_a = (self.stage.jac_sparsity(2, i) for i in (0, 2))
+        others = list(range(self.system.equations.unknowns, self.total))
+        return not by_a.sub(own, list(range(self.quantities)))[0].nnz() and not by_d.sub(own, others)[0].nnz()
+
     @functools.cached_property
     def outputs(self) -> ca.Function:
-        """``(state, numbers, v) -> answers``; state: rotations, displacements, multipliers, turn-counting angles."""
+        """``(state, numbers, v, a) -> answers``; state: rotations, displacements, multipliers, turn-counting angles."""
         return answers_of_motion(self.results, self.arguments, self.system, self.time)
 
     @functools.cached_property

@@ -249,9 +249,17 @@ class _Made:
         q, y, _, unwrapped = self._split(states)
         system = self.system
         full = self.form._full(q, numbers)
-        zeros = ca.MX.zeros(system.system.layout.lam)
+        lam, a = ca.MX.sym("lam", system.system.layout.lam), ca.MX.sym("a", system.quantities)
         rates = self._seen(states, numbers)[1][: system.quantities]
-        return system.outputs(ca.vertcat(ca.vec(full), y, zeros, unwrapped), numbers, rates)
+        found = system.outputs(ca.vertcat(ca.vec(full), y, lam, unwrapped), numbers, rates, a)
+        # States have neither multipliers nor accelerations.
+        unknown, first = ca.vertcat(lam, a), 0
+        for one in system.results.results:
+            if ca.depends_on(found[first : first + one.size], unknown):
+                message = "found what constraints or inertia exert, which no state tells, accepted: positions,"
+                raise SceneError(f"{message} velocities, energies, springs", ("outputs", one.name))
+            first += one.size
+        return ca.substitute([found], [unknown], [ca.MX.zeros(unknown.shape)])[0]
 
     def _kept(self, states: ca.MX, numbers: ca.MX) -> list[ca.MX]:
         """Gaps of the closings, their rates, and squared lengths of quaternions less one."""

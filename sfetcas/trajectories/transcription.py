@@ -12,7 +12,7 @@ integrators of the same name.  Everything nonlinear is the function of one stage
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -376,31 +376,31 @@ class Transcription:
             if key == one.__hash__() and f"{name} at rest" in self._lifted:
                 return self._lifted[f"{name} at rest"].index.reshape(1, 1)
         for signal in statement.signals.values():
-            along, begin, end = self._signal(signal)
-            if key == signal.along.__hash__():
-                return along.reshape(n, -1)
-            if key == signal.begin.__hash__():
-                return begin.reshape(1, -1)
-            if key == signal.end.__hash__():
-                return end.reshape(1, -1)
+            keys = [one.__hash__() for one in (signal.along, signal.begin, signal.end)]
+            if key in keys:
+                which = keys.index(key)
+                return self._signal(signal)[which]().reshape(n if which == 0 else 1, -1)
         return None
 
-    def _signal(self, signal: Signal) -> tuple[Index, Index, Index]:
-        """Places of a signal at all stages, at the begin and at the end."""
+    def _signal(self, signal: Signal) -> tuple[Callable[[], Index], ...]:
+        """What gives the places of a signal at all stages, at the begin and at the end."""
         shape = (self.intervals, self.stages, 1)
         if signal.kind == "time":
             block = self._time()
-            zero = self._constant("time at t0", 0.0)
-            return block.index[..., None], zero.index, self.end.index
+            return (
+                lambda: block.index[..., None],
+                lambda: self._constant("time at t0", 0.0).index,
+                lambda: self.end.index,
+            )
         if signal.kind == "control":
             number = [one.name for one in self.statement.controls].index(signal.name)
             own = self.controls[number].index
-            return self.at_stages[number][..., None], own[:1], own[-1:]
+            return lambda: self.at_stages[number][..., None], lambda: own[:1], lambda: own[-1:]
         if signal.kind == "rate":
             own = self.rates[signal.name].index
-            return np.broadcast_to(own[:, None, None], shape), own[:1], own[-1:]
+            return lambda: np.broadcast_to(own[:, None, None], shape), lambda: own[:1], lambda: own[-1:]
         block = self._lifted[signal.name]
-        return block.index, self._begun(signal.name).index, block.index[-1, -1]
+        return lambda: block.index, lambda: self._begun(signal.name).index, lambda: block.index[-1, -1]
 
     def _time(self) -> Unknown:
         if "time" not in self._lifted:
@@ -419,13 +419,26 @@ class Transcription:
         return self._lifted[name]
 
     def _begun(self, name: str) -> Unknown:
-        """An answer at the begin, which is known."""
-        return self._constant(f"{name} at t0", self._begun_values(name)[self.system.picked[name]])
+        """An answer at the begin, which is known.
+
+        Raises
+        ------
+        SceneError
+            It hangs on forces of constraints or inertia, which controls change at once.
+        """
+        values = self._begun_values(name)
+        if np.isnan(values).any():
+            message = "found what constraints or inertia exert, which is not known at t0, accepted: at later times, or"
+            raise SceneError(f"{message} positions, velocities, energies, springs", ("answer", name))
+        return self._constant(f"{name} at t0", values[self.system.picked[name]])
 
     def _begun_values(self, name: str) -> Array:
+        """An answer at the begin; nan where it is not known then."""
         system, results = self.system, self.system.results.results
         first = int(np.sum([one.size for one in results[: [one.name for one in results].index(name)]], dtype=int))
         size = next(one.size for one in results if one.name == name)
+        if not system.known_at_rates(name):
+            return np.full(size, np.nan)
         zeros = np.zeros(system.quantities)
         outputs = system.stage(system.start, system.begin.v, zeros, system.arguments.defaults, system.reference)[2]
         return np.array(outputs).ravel()[first : first + size]
@@ -489,7 +502,10 @@ class Transcription:
         return turned[:, :size].reshape(len(d), n.rotations, n.components), turned[:, size:]
 
     def answer(self, name: str, x: Array) -> Array:
-        """An answer at the begin and all stages, (1 + stages, size), SI units, in a solution x (n,)."""
+        """An answer at the begin and all stages, (1 + stages, size), SI units, in a solution x (n,).
+
+        It is nan at the begin where it hangs on forces of constraints or inertia.
+        """
         result = next(one for one in self.system.results.results if one.name == name)
         found = np.zeros((1 + self.intervals * self.stages, result.size))
         picked = self.system.picked[name]
