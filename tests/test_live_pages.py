@@ -133,6 +133,15 @@ def test_a_notebook_shows_a_live_page_in_a_frame(chromium, bend, tmp_path, monke
     window.close()
 
 
+def test_a_browser_that_cannot_run_the_solver_shows_the_answer(opened, chromium, bend):
+    window = chromium.new_page(viewport={"width": 1100, "height": 700})
+    window.add_init_script("delete window.DecompressionStream")
+    page = opened(*bend, window=window)
+    assert "The solver does not run in this browser" in page.window.locator("#panel-live").inner_text()
+    assert page.inked() > 0
+    assert page.run("sfetcas.state()") < len(bend[0].steps)
+
+
 def test_the_tip_of_a_force_is_dragged(opened, bend):
     bend, file = bend
     page = opened(bend, file)
@@ -320,6 +329,9 @@ def test_a_motion_runs_stops_and_begins_anew(opened, swinging):
     kinetic, elastic, total = (energy(page, key) for key in ("kinetic", "elastic", "total"))
     assert kinetic > 0.0 < elastic
     assert -1.001 * place[1] < total - kinetic - elastic < total < 0.0
+    page.window.locator("#tab-answer").click()
+    assert "reaction at A" in page.window.locator("#panel-answer").inner_text()
+    page.window.locator("#tab-live").click()
     page.window.wait_for_timeout(100)
     assert seconds(page) == first
     page.window.locator("#live-run").click()

@@ -882,7 +882,14 @@
   // -- the solver itself ----------------------------------------------------------------------------------------------
 
   /* On live pages the text of live.js stands here. */
-  const live = data.live ? withSolver(data.live, await unzipped(data.live.module)) : null;
+  let live = null, lacking = "";
+  if (data.live) {
+    try {
+      live = withSolver(data.live, await unzipped(data.live.module));
+    } catch (error) {
+      lacking = `The solver does not run in this browser (${error.message}): the page shows the answer without it.`;
+    }
+  }
 
   // -- begin ----------------------------------------------------------------------------------------------------------
 
@@ -917,11 +924,12 @@
     made("p", `${marks}Click or drag: the structure follows.`, panel);
   }
   if (live) live.begin();
+  if (lacking) made("p", lacking, addPanel("Live"));
   addPanel("Values", showValues);
   addPanel("Answer", showAnswer);
   made("pre", data.report, addPanel("Report"));
   made("pre", data.scene, addPanel("Scene"));
-  open(live ? "Live" : charted.length ? "Chart" : "Report");
+  open(data.live ? "Live" : charted.length ? "Chart" : "Report");
   if (live) state = known;
 
   $("state").max = known - 1;
