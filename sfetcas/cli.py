@@ -729,7 +729,8 @@ def _span(text: str) -> tuple[str, tuple[float, float] | None]:
     from .sweeps.texts import assigned
 
     name, span = assigned(text)
-    if not span:
+    # A name of the scene may have the sign, but no key of a record that ends it.
+    if not span and name and "=" not in name.rpartition(".")[2]:
         return name, None
     try:
         low, high = map(float, span.split(":"))

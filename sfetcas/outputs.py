@@ -110,7 +110,7 @@ def outputs_of_page(
     SceneError
         Its ending is no page's, it cannot be written, or is the scene itself; no live page shows the scene.
     """
-    from .pages.live import check_live
+    from .pages.live import check_ahead, check_live
     from .pages.page import ENDINGS, page_of
     from .pictures.files import check_ending
 
@@ -121,6 +121,7 @@ def outputs_of_page(
         raise SceneError(f"{path}: is the scene itself, accepted: another file")
     if options.live:
         _placed("--live", lambda: check_live(scene))
+        check_ahead(scene, arguments, settings)
     elif arguments is not None:
         raise SceneError("--argument: found without effect, accepted: with --live")
     source = options.file.read_text(encoding="utf-8")

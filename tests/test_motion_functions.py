@@ -139,7 +139,7 @@ def test_parameters_are_arguments():
         ({"outputs": ["nodes.tpi.position"]}, "tpi"),
         ({"outputs": ["reactions.hub.force"]}, "outputs.reactions.hub.force: found what constraints or inertia exert"),
         ({"inputs": ["sections.strip.EI3"]}, "accepted: a component of the value of a load"),
-        ({"parameters": ["sections.strip.rhoA"]}, "found numbers that change masses"),
+        ({"parameters": ["sections.strip.rhoA"]}, "found sections.strip.rhoA, with which masses change"),
         ({"parameters": ["members.arm.elements"]}, "members.arm.elements"),
     ],
 )

@@ -24,17 +24,17 @@ from typing import Any
 import numpy as np
 
 from ..codegen.folder import export
-from ..codegen.timestep import TimeStep
+from ..codegen.timestep import TimeStep, time_step
 from ..description.loads import Load, Motion
 from ..description.records import plain
 from ..description.scene import Scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from ..parametric.arguments import FACTOR, Argument, Asked
-from ..parametric.equilibrium import EquilibriumSolver
+from ..parametric.arguments import FACTOR, Argument, Asked, asked_for
+from ..parametric.equilibrium import EquilibriumSolver, refuse_search
 
-__all__ = ["check_live", "live_of"]
+__all__ = ["check_ahead", "check_live", "live_of"]
 
 NAME = "live"
 
@@ -87,6 +87,28 @@ def check_live(scene: Scene) -> None:
     _compiler()
 
 
+def check_ahead(scene: Scene, arguments: Asked, settings: Settings) -> None:
+    """Refuse before anything is solved what :func:`live_of` would refuse of arguments and of the steps of a motion.
+
+    Raises
+    ------
+    SceneError
+        As of :func:`live_of`; :func:`check_live` has to accept the scene.
+    """
+    if scene.analysis.type == "dynamic":
+        _refuse_short(time_step(scene, NAME, arguments=arguments, settings=settings))
+    else:
+        asked_for(scene, arguments)
+        refuse_search(scene, stopped=True, touching=True)
+
+
+def _refuse_short(made: TimeStep) -> None:
+    """Refuse steps that are shorter than any that is taken."""
+    if made.usual < made.shortest:
+        message = f"found {made.usual:g} s, accepted of a live page: at least {made.shortest:.2g} s"
+        raise SceneError(message, ("analysis", "step"))
+
+
 def live_of(
     scene: Scene, places: Mapping[str, Array], arguments: Asked = None, settings: Settings | None = None
 ) -> Any:
@@ -124,14 +146,13 @@ def live_of(
         folder = Path(place) / NAME
         asked = {name: x.tolist() for name, x in flexible.items()}
         made = export(scene, folder, name=NAME, arguments=arguments, places=asked, settings=settings)
+        if isinstance(made, TimeStep):
+            _refuse_short(made)
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
         glue = GLUE % ("LIVE_TIMES" if moving else "1") + (OF_MOTION if moving else OF_EQUILIBRIA)
         (folder / "glue.c").write_text(glue, encoding="utf-8")
         module = _compiled(folder, re.findall(r"(live_\w+)\([^()]*\) \{", glue))
     assert isinstance(made, EquilibriumSolver | TimeStep)
-    if isinstance(made, TimeStep) and made.usual < made.shortest:
-        message = f"found {made.usual:g} s, accepted of a live page: at least {made.shortest:.2g} s"
-        raise SceneError(message, ("analysis", "step"))
     offered = {one.name: _spans(scene, one) for one in made.arguments.arguments}
     if scene.analysis.range:
         # A path need not come to the factor of its loads.

@@ -336,6 +336,12 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
     if outside:
         message = f"found {outside[0]:g} in the scene, accepted: a range from low to high that has it"
         raise SceneError(message, ("arguments", name))
+    for one in found.names if low is not None and high is not None and found.numbers is None else ():
+        least, most = _possible(one)
+        # A range of what is above zero may begin there.
+        if low < min(least, 0.0) or high > most:
+            accepted = "from zero on" if low < least else "up to zero"
+            raise SceneError(f"found {low:g} to {high:g}, accepted for this number: {accepted}", ("arguments", name))
     return found
 
 
@@ -726,6 +732,16 @@ class Arguments:
                 histories[name.partition(".")[2]] = History(t=(0.0, 1.0), value=(value, value))
         analysis = scene.analysis.model_copy(update={"steps": steps})
         return scene.model_copy(update={"analysis": analysis, "histories": histories})
+
+    def model_near(self, one: Argument) -> Model:
+        """The model where one of the arguments alone is not as in the scene, but near that."""
+        values = self.defaults.copy()
+        for i, near in zip(self._own, self._generic(1.0).tolist(), strict=True):
+            if self._names[i] in one.names:
+                values[i] = near
+        scene, model = self.scene_at(values), self.model
+        mesh = self.mesh_at(scene, model.mesh)
+        return assemble(scene, mesh, assembly=model.assembly, scales=model.scales)  # type: ignore[arg-type]
 
     def mesh_at(self, scene: Scene, mesh: Mesh, places: Array | None = None) -> Mesh:
         """A mesh of the scene as given, with ends of elements where they are with other values of its numbers.

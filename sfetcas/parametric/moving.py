@@ -87,7 +87,11 @@ def parametric_stages(arguments: Arguments, masses: Masses, unilateral: Unilater
     model = arguments.model
     found, frame = masses_of(model), model.rotating_frame
     if not _same(masses, found):
-        raise SceneError("found numbers that change masses, accepted: loads, motions, stiffness", ("arguments",))
+        changing = [one.name for one in arguments.arguments if not _same(masses, masses_of(arguments.model_near(one)))]
+        message = (
+            f"found {', '.join(changing) or 'numbers'}, with which masses change, accepted: loads, motions, stiffness"
+        )
+        raise SceneError(message, ("arguments",))
     # Coriolis forces are weights of rates, as masses are of accelerations.
     if frame is not None:
         given = np.asarray(arguments.scene_at(arguments.defaults).rotating, dtype=float)
