@@ -213,6 +213,30 @@ def test_energies_of_members_and_springs_add_up_to_the_strain_energy():
     assert "energy" not in step.table("members", "c")
 
 
+def test_springs_that_are_strained_where_nothing_is_loaded_have_their_energy():
+    """Half the stiffness times the squared way from rest: from the undeformed scene on, and none where they relax."""
+    springs = {
+        "turn": {"type": "rotational", "node": "A", "stiffness": 3.0, "rest": 0.2},
+        "line": {"type": "translational", "node": "B", "stiffness": 50.0, "direction": [0, 1], "rest": 0.3},
+        "rope": {"type": "translational", "node": "B", "stiffness": 8.0, "anchor": [1, -1], "length": 0.5},
+    }
+    table = {
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0], "mass": 1.0}},
+        "members": {"arm": {"nodes": ["A", "B"], "type": "rigid"}},
+        "springs": springs,
+    }
+    motion = solve(Scene.from_dict({**table, "analysis": {"type": "dynamic", "end": 0.5, "output": 0.5}}))
+    for state in motion.steps:
+        x, y, angle = *state.position("B")[:2], state.angle("A")
+        wanted = 1.5 * (angle - 0.2) ** 2 + 25.0 * (y - 0.3) ** 2 + 4.0 * (np.hypot(x - 1.0, y + 1.0) - 0.5) ** 2
+        assert state.energy["elastic"] == pytest.approx(wanted, rel=1e-9)
+    assert motion.steps[0].energy["elastic"] == pytest.approx(0.06 + 2.25 + 1.0, rel=1e-12)
+    # Nothing is taken, from the first state on.
+    assert motion.last.energy["total"] == pytest.approx(motion.steps[0].energy["total"], rel=1e-5)
+    alone = solve(Scene.from_dict({**table, "springs": {"turn": springs["turn"]}, "analysis": {"steps": [1.0]}}))
+    assert alone.steps[0].energy["elastic"] == pytest.approx(0.0, abs=1e-15)
+
+
 def test_expressions_say_what_answers_say():
     """Each name that both know, of a frame in the plane, of a bent rod in space, and of one that stretches."""
     square = {"shape": "rectangle", "width": 0.03, "height": 0.02, "E": 1e6, "nu": 0.3}

@@ -346,7 +346,7 @@ class Configuration:
 
     @functools.cached_property
     def energy(self) -> dict[str, float]:
-        """``elastic`` energy, potential of the ``loads``, and their ``total``, N m; zero for the undeformed scene.
+        """``elastic`` energy, potential of the ``loads`` since the undeformed scene, and their ``total``, N m.
 
         Where laws have memory also what they have ``dissipated``, which the total does not have.
         """

@@ -88,7 +88,7 @@ class Point:
     Attributes
     ----------
     potential, strain : float
-        Potential energy (zero for the undeformed, unloaded scene) and its elastic part.
+        Potential energy (that of loads zero in the undeformed scene) and its elastic part.
     residual : ndarray (unknowns + rows,)
         Out-of-balance moments and forces, then gaps of the constraints.
     scale : ndarray (unknowns + rows,)

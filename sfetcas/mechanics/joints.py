@@ -237,9 +237,8 @@ class TurnSpring(Turning):
         return self.angle(q, data)
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Half the stiffness times the squared angle from rest, less its value in the undeformed scene."""
-        angle = self.angle(q, data)
-        return 0.5 * data[self.first] * angle * (angle - 2.0 * data[self.first + 1])
+        """Half the stiffness times the squared angle from rest."""
+        return 0.5 * data[self.first] * (self.angle(q, data) - data[self.first + 1]) ** 2
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """The angle, and the moment on the second side."""
@@ -307,10 +306,10 @@ class Spring(Term):
         return ca.norm_2(data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])) - data[n + 1]
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Half the stiffness times the squared elongation, less its value in the undeformed scene."""
+        """Half the stiffness times the squared elongation."""
         n = self.axes
         gap = data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])
-        return 0.5 * data[n] * (self._square(gap, data[n + 1]) - self._square(data[:n], data[n + 1]))
+        return 0.5 * data[n] * self._square(gap, data[n + 1])
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """The elongation, and the force on the second side, negative in tension."""
@@ -342,9 +341,9 @@ class LineSpring(Term):
         return ca.dot(data[: self.axes], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)]))
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Half the stiffness times the squared displacement from rest, less its value in the undeformed scene."""
-        n, travel = self.axes, self.travel(q, u, data)
-        return 0.5 * data[n] * travel * (travel - 2.0 * data[n + 1])
+        """Half the stiffness times the squared displacement from rest."""
+        n = self.axes
+        return 0.5 * data[n] * (self.travel(q, u, data) - data[n + 1]) ** 2
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """The displacement along the direction, and the force."""

@@ -305,7 +305,7 @@ class Program:
 
     @functools.cached_property
     def potential(self) -> ca.MX:
-        """Potential energy over ``model.scales.moment``, zero for the undeformed, unloaded scene.
+        """Potential energy over ``model.scales.moment``, of loads zero in the undeformed scene.
 
         Loads without potential do not count.
         """
