@@ -153,6 +153,8 @@ def test_what_turns_without_inertia_is_refused():
     thin = arm("space").replace(sections={"strip": SECTION.replace(rhoI=None)})
     with pytest.raises(SceneError, match="found rotations without inertia"):
         motion_functions(thin, ["loads.motor.value.2"])
+    with pytest.raises(SceneError, match=r"found stretch or shear, of which a part has no inertia.*sections without"):
+        motion_functions(arm().replace(sections={"strip": SECTION.replace(EA=400.0)}))
 
 
 def test_what_the_multiplier_of_a_constraint_tells_is_no_output():

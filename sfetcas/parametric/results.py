@@ -113,7 +113,7 @@ def default_motion_results(model: Model, *, forces: bool = False) -> list[str]:
     moving = [name.text for name in every if name.kind.table == "nodes" or name.kind.key == "position"]
     sprung = [name.text for name in every if name.kind.table == "springs" and name.kind.key in TRAVELS]
     pushed = [name.text for name in every if name.kind.table == "contacts"]
-    energies = [f"energy.{key}" for key in ("kinetic", "elastic", "total")]
+    energies = [f"energy.{key}" for key in ("kinetic", "elastic", "loads", "total")]
     held = [name for name, node in model.scene.nodes.items() if forces and node.support != "free"]
     keys = {name: ("force",) if shares_rotation(model, name) else ("force", "moment") for name in held}
     reactions = [f"reactions.{name}.{key}" for name, own in keys.items() for key in own]

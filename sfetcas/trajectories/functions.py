@@ -294,10 +294,11 @@ class _Made:
             scaled = scaled / np.maximum(np.abs(scaled).max(axis=axis, keepdims=True), TINY)
         sizes = np.linalg.svd(scaled, compute_uv=False)
         if sizes[-1] < tolerances.RANK * sizes[0]:
-            accepted = "rhoI of sections, or inertia at nodes, in motion_functions"
-            raise SceneError(
-                f"found rotations without inertia, or closings that depend on each other, accepted: {accepted}"
-            )
+            what, accepted = "rotations without inertia", "rhoI of sections, or inertia at nodes"
+            if self.system.model.element.strains:
+                what, accepted = "stretch or shear, of which a part has no inertia", "sections without"
+            message = f"found {what}, or closings that depend on each other, accepted: {accepted}"
+            raise SceneError(f"{message}, in motion_functions")
 
 
 KEPT = ["gaps", "rates", "norms"]
