@@ -336,10 +336,13 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
     if outside:
         message = f"found {outside[0]:g} in the scene, accepted: a range from low to high that has it"
         raise SceneError(message, ("arguments", name))
-    for one in found.names if low is not None and high is not None and found.numbers is None else ():
-        least, most = _possible(one)
+    if low is not None and high is not None:
         # A range of what is above zero may begin there.
-        if low < min(least, 0.0) or high > most:
+        least, most = (
+            max(min(_possible(one)[0], 0.0) for one in found.names),
+            min(_possible(one)[1] for one in found.names),
+        )
+        if low < least or high > most:
             accepted = "from zero on" if low < least else "up to zero"
             raise SceneError(f"found {low:g} to {high:g}, accepted for this number: {accepted}", ("arguments", name))
     return found
@@ -741,7 +744,7 @@ class Arguments:
                 values[i] = near
         scene, model = self.scene_at(values), self.model
         mesh = self.mesh_at(scene, model.mesh)
-        return assemble(scene, mesh, assembly=model.assembly, scales=model.scales)  # type: ignore[arg-type]
+        return assemble(scene, mesh, assembly=model.assembly, scales=model.scales)
 
     def mesh_at(self, scene: Scene, mesh: Mesh, places: Array | None = None) -> Mesh:
         """A mesh of the scene as given, with ends of elements where they are with other values of its numbers.
