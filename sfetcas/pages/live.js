@@ -4,11 +4,14 @@
   const FRAME = 12, HALVINGS = 8, SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
   const DONE = 0, UNSTABLE = 1;
 
-  const unzipped = (text) => new Response(new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+  /** The functions of the solver, of its zipped code. */
+  const compiled = async (text) => {
+    const bytes = new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return new WebAssembly.Instance(new WebAssembly.Module(await new Response(bytes).arrayBuffer()), {}).exports;
+  };
 
   /** The solver in the page: of equilibria, each found from the one before, or of a motion, step by step. */
-  function withSolver(given, bytes) {
-    const code = new WebAssembly.Instance(new WebAssembly.Module(bytes), {}).exports;
+  function withSolver(given, code) {
     if (code._initialize) code._initialize();
     const size = (list) => list.reduce((sum, one) => Math.max(sum, one.first + one.size), 0), count = size(given.arguments);
     const results = new Float64Array(code.memory.buffer, code.live_results(), size(given.results));

@@ -882,14 +882,15 @@
   // -- the solver itself ----------------------------------------------------------------------------------------------
 
   /* On live pages the text of live.js stands here. */
-  let live = null, lacking = "";
+  let code = null, lacking = "";
   if (data.live) {
     try {
-      live = withSolver(data.live, await unzipped(data.live.module));
+      code = await compiled(data.live.module);
     } catch (error) {
       lacking = `The solver does not run in this browser (${error.message}): the page shows the answer without it.`;
     }
   }
+  const live = code ? withSolver(data.live, code) : null;
 
   // -- begin ----------------------------------------------------------------------------------------------------------
 

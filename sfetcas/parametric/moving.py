@@ -139,6 +139,7 @@ def _same(one: Masses, other: Masses) -> bool:
     return all(_alike(a, b) for a, b in pairs) and all(_alike(a, b, np.abs(a).max(initial=0.0)) for a, b in placed)
 
 
+@functools.cache
 def _felt(kind: Term) -> list[int]:
     """Which of the data of a kind its rows depend on."""
     return sorted(set(rows_of(kind).jac_sparsity(0, 2).get_col()))

@@ -107,7 +107,7 @@ def default_motion_results(model: Model, *, forces: bool = False) -> list[str]:
     """Default results of a motion: positions, rotations and velocities of nodes, positions along members, springs,
     what obstacles do, and energies.
 
-    With ``forces`` reactions and what makes motions as well, at all nodes that share no rigid body with another one.
+    With ``forces`` reactions as well; where several supports hold one rigid body, their forces alone.
     """
     every = [answer_name(name) for name in default_results(model, unique=False)]
     moving = [name.text for name in every if name.kind.table == "nodes" or name.kind.key == "position"]
