@@ -237,6 +237,24 @@ def test_springs_that_are_strained_where_nothing_is_loaded_have_their_energy():
     assert alone.steps[0].energy["elastic"] == pytest.approx(0.0, abs=1e-15)
 
 
+def test_no_elastic_energy_is_below_zero_by_rounding():
+    """Springs at their rest, whatever their lengths."""
+    table = {
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0], "mass": 1.0}},
+        "members": {"arm": {"nodes": ["A", "B"], "type": "rigid"}},
+    }
+    lengths = np.linspace(0.1, 2.0, 20)
+    springs = {
+        f"s{i}": {"type": "translational", "node": "B", "stiffness": 1e5, "anchor": [1 + a, 1.3 * a]}
+        | {"length": float(np.hypot(a, 1.3 * a))}
+        for i, a in enumerate(lengths)
+    }
+    for name, spring in springs.items():
+        state = solve(Scene.from_dict({**table, "springs": {name: spring}, "analysis": {"steps": [1.0]}})).last
+        # Half the stiffness times the square of rounding of the length.
+        assert 0.0 <= state.energy["elastic"] <= 0.5 * 1e5 * 1e-30 * 16.0
+
+
 def test_expressions_say_what_answers_say():
     """Each name that both know, of a frame in the plane, of a bent rod in space, and of one that stretches."""
     square = {"shape": "rectangle", "width": 0.03, "height": 0.02, "E": 1e6, "nu": 0.3}

@@ -320,7 +320,9 @@ class Spring(Term):
     def _square(gap: ca.SX, free: ca.SX) -> ca.SX:
         """Square of the elongation; with a free length of zero it has no kink where the places meet."""
         square = ca.dot(gap, gap)
-        return square - 2.0 * free * ca.sqrt(ca.if_else(free == 0.0, 1.0, square)) + free**2
+        # As a square, not as a sum that rounding leaves below zero at rest.
+        longer = ca.sqrt(ca.if_else(free == 0.0, 1.0, square)) - free
+        return ca.if_else(free == 0.0, square, longer**2)
 
 
 @final
